@@ -1,0 +1,216 @@
+"""Image files: which there are, and their grey levels exactly as the sensor gave them.
+
+The only place in the core that touches OpenCV, and only inside functions.
+"""
+
+import glob
+import hashlib
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opencsp_calib.atomic import replacing
+from opencsp_calib.errors import InputError, MissingDependencyError
+from opencsp_calib.image import Image
+
+if TYPE_CHECKING:
+    from opencsp_calib.camera import Camera
+
+__all__ = ["EXTENSIONS", "ImageFile", "find_images", "opencv_on_one_thread", "read_image", "undistort", "write_image"]
+
+EXTENSIONS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".pnm", ".ppm", ".webp")
+MAX_BYTES = 2**31
+
+
+@dataclass(frozen=True)
+class ImageFile:
+    """An image file to be looked at.
+
+    Parameters
+    ----------
+    name : str
+        What reports call it, unique within the set: its path below the folder all have in common.
+    path : Path
+    """
+
+    name: str
+    path: Path
+
+
+def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> tuple[ImageFile, ...]:
+    """The image files that files, folders and glob patterns name, in order.
+
+    A folder gives its image files by extension, sorted naturally (2 before 10), not those of its subfolders; other
+    files in it are passed over. A file named explicitly is taken whatever its extension.
+
+    Raises
+    ------
+    InputError
+        If something named does not exist, or there is no image at all.
+    """
+    given = [inputs] if isinstance(inputs, str | os.PathLike) else list(inputs)
+    paths = [path for one in given for path in _expanded(os.fspath(one))]
+    if not paths:
+        raise InputError("no images were given")
+    parents = {path.absolute().parent for path in paths}
+    root = Path(os.path.commonpath(parents)) if len({parent.drive for parent in parents}) == 1 else None
+    counts: dict[str, int] = {}
+    files = []
+    for path in paths:
+        name = path.absolute().relative_to(root).as_posix() if root else str(path)
+        counts[name] = counts.get(name, 0) + 1
+        files.append(ImageFile(name if counts[name] == 1 else f"{name} ({counts[name]})", path))
+    return tuple(files)
+
+
+def _expanded(text: str) -> list[Path]:
+    path = Path(text)
+    if path.is_dir():
+        found = sorted((p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and p.is_file()), key=_natural)
+        if not found:
+            raise InputError(f"the folder {path} has no image files ({', '.join(EXTENSIONS)})")
+        return found
+    if path.exists():
+        return [path]
+    if glob.has_magic(text):
+        found = sorted((Path(p) for p in glob.glob(text) if Path(p).is_file()), key=_natural)
+        if not found:
+            raise InputError(f"no file matches {text}")
+        return found
+    raise InputError(f"no such file or folder: {path}")
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sorts image2 before image10."""
+    return [(int(part), "") if part.isdecimal() else (-1, part.lower()) for part in re.split(r"([0-9]+)", path.name)]
+
+
+def read_image(file: ImageFile) -> Image:
+    """The grey levels of an image file, 8 or 16 bit, colour turned to grey.
+
+    The pixels stay as the sensor has them: an orientation noted in the file (EXIF), which would turn them and swap
+    width and height, is not followed.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, is empty, cut short, or no image; the message names it and the reason.
+    MissingDependencyError
+        If OpenCV is not installed.
+    """
+    cv2 = _opencv()
+    try:
+        if file.path.stat().st_size > MAX_BYTES:
+            raise InputError(f"{file.path} is larger than {MAX_BYTES >> 30} GiB")
+        data = file.path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{file.path} cannot be read: {error.strerror}") from None
+    if not data:
+        raise InputError(f"{file.path} is empty")
+    if _cut_short(data):
+        raise InputError(f"{file.path} is cut short; copy it again from the camera")
+    flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
+    try:
+        pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
+    except cv2.error as error:
+        raise InputError(f"{file.path} cannot be read as an image: {error.err}") from None
+    if pixels is None:
+        raise InputError(f"{file.path} cannot be read as an image; it is damaged or of an unknown kind")
+    if pixels.dtype not in (np.uint8, np.uint16):
+        raise InputError(f"{file.path} has {pixels.dtype} pixels; save it with 8 or 16 bits")
+    return Image(file.name, pixels, hashlib.sha256(data).hexdigest())
+
+
+def _cut_short(data: bytes) -> bool:
+    """Whether a PNG or JPEG lacks its end: the decoder would fill the rest with grey and say nothing."""
+    if data.startswith(b"\x89PNG"):
+        return b"IEND" not in data[-64:]
+    if data.startswith(b"\xff\xd8"):
+        return b"\xff\xd9" not in data[-4096:]
+    return False
+
+
+def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:
+    """Write grey levels losslessly as PNG, aside and then in place.
+
+    Parameters
+    ----------
+    pixels : (height, width) uint8 or uint16
+    path : path-like
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
+    cv2 = _opencv()
+    done, data = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
+    if not done:
+        raise InputError(f"cannot write {path}: not an image of 8 or 16 bits")
+    with replacing(path) as temporary:
+        temporary.write_bytes(data.tobytes())
+
+
+def undistort(image: NDArray[Any], camera: "Camera", target: "Camera | None" = None) -> NDArray[Any]:
+    """An image as a camera without distortion would have taken it.
+
+    Parameters
+    ----------
+    image : (height, width) or (height, width, channels)
+        Of the camera's image size.
+    camera : Camera
+        That took it.
+    target : Camera, optional
+        That should have taken it; by default a pinhole with the same focal lengths, principal point and size.
+
+    Returns
+    -------
+    array of the same type
+        Interpolated linearly; 0 where nothing was photographed.
+
+    Raises
+    ------
+    InputError
+        If the image has another size than the camera's.
+    """
+    from opencsp_calib.camera import Camera
+
+    cv2 = _opencv()
+    height, width = image.shape[:2]
+    if (width, height) != camera.image_size:
+        size = "x".join(map(str, camera.image_size))
+        raise InputError(f"the image is {width}x{height}, but the camera {camera.name!r} is for {size}")
+    target = target or Camera(camera.name, "pinhole", camera.params[:4], camera.image_size)
+    y, x = np.mgrid[: target.image_size[1], : target.image_size[0]]
+    rays = target.unproject(np.column_stack([x.ravel(), y.ravel()]))
+    source = camera.project(rays).astype(np.float32).reshape(*x.shape, 2)
+    source[np.isnan(source)] = -1e6  # outside, so that it becomes 0
+    return np.asarray(cv2.remap(image, source[..., 0], source[..., 1], cv2.INTER_LINEAR))
+
+
+@contextmanager
+def opencv_on_one_thread() -> Iterator[None]:
+    """OpenCV's own threads off while ours are at work, so that they do not fight over the cores; then as before."""
+    cv2 = _opencv()
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        yield
+    finally:
+        cv2.setNumThreads(before)
+
+
+def _opencv() -> Any:
+    try:
+        import cv2
+    except ImportError as error:
+        message = f"OpenCV cannot be imported ({error}); pip install 'opencsp-calib[opencv]'"
+        raise MissingDependencyError(message) from None
+    return cv2
