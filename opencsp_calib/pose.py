@@ -31,12 +31,13 @@ class Pose:
     @classmethod
     def from_matrix(cls, rotation: Matrix, translation: Vector) -> "Pose":
         """From a rotation matrix (3, 3) and a translation (3,) m."""
-        return cls(Rotation.from_matrix(rotation).as_rotvec(), translation)
+        return cls(Rotation.from_matrix(np.array(rotation)).as_rotvec(), translation)
 
     @property
     def matrix(self) -> Matrix:
         """(3, 3) rotation matrix."""
-        return np.asarray(Rotation.from_rotvec(self.rotation).as_matrix(), dtype=np.float64)
+        # a copy, because SciPy asks for a writable buffer
+        return np.asarray(Rotation.from_rotvec(self.rotation.copy()).as_matrix(), dtype=np.float64)
 
     def transform(self, points: Points) -> Points:
         """(N, 3) m board points in the camera's frame."""

@@ -1,0 +1,224 @@
+"""The camera file: what OpenCSP reads, and beside it everything the calibration can be repeated from.
+
+::
+
+    /Camera                          what OpenCSP's Camera.load_from_hdf reads, to the last bit
+        attributes: format_version, model, checksum (SHA-256 over the group)
+        intrinsic_mat   (3, 3) f8    [fx 0 cx; 0 fy cy; 0 0 1], pixels
+        distortion_coef (n,) f8      OpenCV order; a pinhole camera has four zeros; a fisheye camera has none, so that
+                                     OpenCSP refuses it instead of taking its coefficients for others
+        fisheye_coef    (4,) f8      of a fisheye camera: k1..k4
+        image_shape_xy  (2,) i4      width, height
+        name            string
+    /Calibration                     ignored by OpenCSP; see `hdf5_calibration`
+
+A file without ``format_version`` is OpenCSP's own; its oddities are read as OpenCSP reads them. Any file whose
+checksum is missing or wrong though it has a ``format_version`` is refused.
+"""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.atomic import replacing
+from opencsp_calib.camera import Camera
+from opencsp_calib.detection import Problem
+from opencsp_calib.errors import FileFormatError, InputError
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["FORMAT_VERSION", "load_camera", "opened", "read_camera", "read_dataset", "save_camera", "write_camera"]
+
+FORMAT_VERSION = 1
+MODEL_BY_COEFFICIENTS = {4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
+MAX_VALUES = 50_000_000  # in one dataset; more is a damaged or hostile file
+
+
+def save_camera(camera: Camera, path: str | os.PathLike[str]) -> None:
+    """Write a camera file without a calibration.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; what was there before stays.
+    """
+    import h5py
+
+    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+        write_camera(camera, file)
+
+
+def load_camera(path: str | os.PathLike[str]) -> Camera:
+    """The camera of a camera file, ours or OpenCSP's.
+
+    Raises
+    ------
+    FileFormatError
+        If it is damaged, or no camera file.
+    InputError
+        If there is no such file.
+    """
+    return read_camera(path)[0]
+
+
+def read_camera(path: str | os.PathLike[str]) -> tuple[Camera, tuple[Problem, ...]]:
+    """Like `load_camera`, with what a person should know about the file."""
+    with opened(path) as file:
+        return _camera(file, str(path))
+
+
+def write_camera(camera: Camera, file: "h5py.File") -> None:
+    """Write the group /Camera into an open file."""
+    group = file.create_group("Camera")
+    group["intrinsic_mat"] = camera.matrix
+    if camera.model == "opencv_fisheye":
+        group["fisheye_coef"] = camera.distortion
+    else:
+        group["distortion_coef"] = camera.distortion if camera.distortion.size else np.zeros(4)
+    group["image_shape_xy"] = np.array(camera.image_size, dtype=np.int32)
+    group["name"] = camera.name
+    group.attrs["format_version"] = FORMAT_VERSION
+    group.attrs["model"] = camera.model
+    group.attrs["checksum"] = _checksum(group)
+
+
+@contextmanager
+def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
+    """An HDF5 file, open for reading; whatever is wrong with it ends in a FileFormatError that names it."""
+    import h5py
+
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"no such file: {path}")
+    try:
+        with h5py.File(path, "r") as file:
+            yield file
+    except InputError:
+        raise
+    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError, UnicodeError) as error:
+        raise FileFormatError(f"{path} is not a camera file, or it is damaged: {_one_line(error)}") from None
+
+
+def read_dataset(group: "h5py.Group", name: str) -> Any:
+    """The contents of a dataset that lies within this file and is of a sane size; strings come as str.
+
+    Raises
+    ------
+    FileFormatError
+        If it is missing, is a link to elsewhere, or is too large.
+    """
+    import h5py
+
+    where = f"{group.file.filename}: {group.name.rstrip('/')}/{name}"
+    link = group.get(name, getlink=True)
+    if not isinstance(link, h5py.HardLink):
+        raise FileFormatError(f"{where} is missing" if link is None else f"{where} is a link, which is not followed")
+    dataset = group[name]
+    if not isinstance(dataset, h5py.Dataset) or dataset.external or dataset.is_virtual or dataset.shape is None:
+        raise FileFormatError(f"{where} is not a dataset of this file's own")
+    if dataset.size > MAX_VALUES:
+        raise FileFormatError(f"{where} has {dataset.size} values, more than a camera file can need")
+    if h5py.check_string_dtype(dataset.dtype) is not None:
+        return dataset.asstr()[()]
+    value = dataset[()]
+    if isinstance(value, np.ndarray | np.number):
+        return value
+    raise FileFormatError(f"{where} has values of an unexpected type")
+
+
+def _camera(file: "h5py.File", path: str) -> tuple[Camera, tuple[Problem, ...]]:
+    group = file.get("Camera")
+    if group is None:
+        raise FileFormatError(f"{path} has no group /Camera: it is not a camera file")
+    ours = "format_version" in group.attrs
+    if ours:
+        _verify(group, path)
+    matrix = _numbers(group, "intrinsic_mat", (3, 3))
+    size = _numbers(group, "image_shape_xy", (2,))
+    model, distortion = _distortion(group, path)
+    if abs(matrix[0, 1]) > 1e-9 * abs(matrix[0, 0]):
+        raise FileFormatError(f"{path} has skew ({matrix[0, 1]:g}), which no lens model of ours has")
+    params = [matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion]
+    try:
+        camera = Camera(_name(group), model, np.array(params), (size[0], size[1]))
+    except InputError as error:
+        raise FileFormatError(f"{path}: {error}") from None
+    return camera, _oddities(matrix, path)
+
+
+def _verify(group: "h5py.Group", path: str) -> None:
+    version = int(group.attrs["format_version"])
+    if version > FORMAT_VERSION:
+        raise FileFormatError(f"{path} was written by a newer opencsp-calib (format {version}); update this one")
+    if group.attrs.get("checksum") != _checksum(group):
+        raise FileFormatError(f"{path} is damaged: the checksum of /Camera does not fit its contents")
+
+
+def _checksum(group: "h5py.Group") -> str:
+    digest = hashlib.sha256(f"{group.attrs['format_version']} {group.attrs['model']}".encode())
+    for name in sorted(group):
+        value = read_dataset(group, name)
+        if isinstance(value, str):
+            content = value.encode()
+        else:
+            array = np.ascontiguousarray(value)
+            content = f"{array.dtype.str} {array.shape}".encode() + array.tobytes()
+        digest.update(f"\n{name} {len(content)}\n".encode() + content)
+    return digest.hexdigest()
+
+
+def _distortion(group: "h5py.Group", path: str) -> tuple[str, Floats]:
+    model = str(group.attrs.get("model", ""))
+    if model == "opencv_fisheye":
+        return model, _numbers(group, "fisheye_coef", (4,))
+    coefficients = np.atleast_1d(_numbers(group, "distortion_coef", None))
+    if model == "pinhole" and not coefficients.any():
+        return model, np.empty(0)
+    if coefficients.size not in MODEL_BY_COEFFICIENTS:
+        raise FileFormatError(f"{path} has {coefficients.size} distortion coefficients; OpenCV has 4, 5, 8, 12 or 14")
+    by_size = MODEL_BY_COEFFICIENTS[coefficients.size]
+    if model and model != by_size:
+        raise FileFormatError(f"{path} says its model is {model!r}, but has {coefficients.size} coefficients")
+    return by_size, coefficients
+
+
+def _numbers(group: "h5py.Group", name: str, shape: tuple[int, ...] | None) -> Floats:
+    """A dataset of numbers, squeezed as OpenCSP does: sizes come as (2, 1), coefficients as (1, 5)."""
+    values = np.asarray(read_dataset(group, name)).squeeze()
+    if values.dtype.kind not in "fiu" or (shape is not None and values.shape != shape) or values.ndim > 2:
+        raise FileFormatError(f"{group.file.filename}: /Camera/{name} is not an array of numbers of shape {shape}")
+    if values.size > 100 or not np.isfinite(values).all():
+        raise FileFormatError(f"{group.file.filename}: /Camera/{name} has values that are not finite numbers")
+    return values.astype(np.float64)
+
+
+def _name(group: "h5py.Group") -> str:
+    """The name, written as a string, a byte string or an array with one."""
+    value: Any = read_dataset(group, "name")
+    if isinstance(value, np.ndarray):
+        if value.size != 1:
+            raise FileFormatError(f"{group.file.filename}: /Camera/name is not one name")
+        value = value.ravel()[0]
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
+def _oddities(matrix: Floats, path: str) -> tuple[Problem, ...]:
+    corner = matrix[2, 2]
+    if corner == 1.0:
+        return ()
+    message = (
+        f"{path}: the camera matrix has {corner:g} where 1 belongs, as if it had been scaled as a whole; like OpenCV "
+        "and OpenCSP, this program does not look at that number"
+    )
+    return (Problem("scaled-matrix", message),)
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split())[:200]

@@ -1,0 +1,256 @@
+"""The part of the camera file that OpenCSP passes over: what was seen, and how it was solved.
+
+::
+
+    /Calibration
+        observations/                what went in; a file of only this is what ``detect`` writes
+            image_size      (2,) i4
+            board           JSON     spec, columns, rows, spacing_m
+            board_points    (K, 3) f8  m
+            views           JSON     of every image looked at: image, sha256, status, problems, reason, rejected
+            corners         (n,) i4  how many corners each view has; the next five are those of all views on end
+            ids             (N,) i8
+            pixels          (N, 2) f8
+            covariance      (N, 2, 2) f8  px²; NaN where not known
+            edge_width_px   (N,) f8  NaN where not known
+            contrast        (N,) f8  NaN where not known
+        poses               (V, 6) f8  of the used views: rotation vector (rad), translation (m), board to camera
+        board_points        (K, 3) f8  m, as solved
+        residuals           (M, 2) f8  px, predicted minus detected, of all used views on end
+        outliers            (M,) bool
+        covariance          (P, P) f8  the honest one
+        covariance_residual (P, P) f8
+        solver              string
+        options             JSON     guess, board_shape, pixel_aspect, weights, robust
+        problems            JSON
+        record              JSON     of the camera: focus, aperture, temperature, free notes
+        provenance          JSON     versions, time, where the images were
+
+JSON stands for a string dataset with JSON in it. Two files are equal when everything but ``provenance`` is.
+"""
+
+import json
+import os
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.atomic import replacing
+from opencsp_calib.board import Board, CharucoBoard, Checkerboard, RecordedBoard
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.camera import Camera
+from opencsp_calib.detection import Detection, Observations, Problem, RejectedCorner, Status, View
+from opencsp_calib.errors import FileFormatError
+from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera
+from opencsp_calib.options import SolveOptions
+from opencsp_calib.pose import Pose
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["load_calibration", "load_observations", "save_calibration", "save_observations"]
+
+OPTIONAL = ("covariance", "edge_width_px", "contrast")
+
+
+def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
+    """Write a camera file with its calibration, aside and then in place.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written; what was there before stays.
+    """
+    import h5py
+
+    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+        write_camera(calibration.camera, file)
+        group = file.create_group("Calibration")
+        _write_observations(calibration.observations, group.create_group("observations"))
+        group["poses"] = np.array([[*p.rotation, *p.translation] for p in calibration.cam_from_board]).reshape(-1, 6)
+        group["board_points"] = calibration.board.points
+        group["residuals"] = np.concatenate([np.empty((0, 2)), *calibration.residuals])
+        group["outliers"] = np.concatenate([np.empty(0, dtype=bool), *calibration.outliers])
+        group["covariance"] = calibration.covariance
+        group["covariance_residual"] = calibration.covariance_residual
+        group["solver"] = calibration.solver
+        group["options"] = json.dumps(_options_as_json(calibration.options))
+        group["problems"] = json.dumps(_problems_as_json(calibration.problems))
+        group["record"] = json.dumps(dict(calibration.record))
+        group["provenance"] = json.dumps(dict(calibration.provenance))
+
+
+def load_calibration(path: str | os.PathLike[str]) -> Calibration:
+    """The calibration in a camera file.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or has no calibration in it (OpenCSP's own files have none).
+    """
+    camera, _ = read_camera(path)
+    with opened(path) as file:
+        if "Calibration" not in file or "poses" not in file["Calibration"]:
+            raise FileFormatError(f"{path} has a camera, but not how it was calibrated")
+        group = file["Calibration"]
+        observations = _read_observations(group["observations"])
+        ends = np.cumsum([len(d) for d in observations.detections])[:-1]
+        return Calibration(
+            camera=camera,
+            observations=observations,
+            cam_from_board=tuple(Pose(row[:3], row[3:]) for row in _array(group, "poses", (None, 6))),
+            board=observations.board.with_points(read_dataset(group, "board_points")),
+            solver=str(read_dataset(group, "solver")),
+            options=_options_from_json(_json(group, "options")),
+            residuals=tuple(np.split(_array(group, "residuals", (None, 2)), ends)),
+            outliers=tuple(np.split(_array(group, "outliers", (None,)).astype(bool), ends)),
+            covariance=read_dataset(group, "covariance"),
+            covariance_residual=read_dataset(group, "covariance_residual"),
+            problems=_problems_from_json(_json(group, "problems")),
+            record={str(key): str(value) for key, value in _json(group, "record").items()},
+            provenance=_json(group, "provenance"),
+        )
+
+
+def save_observations(observations: Observations, path: str | os.PathLike[str]) -> None:
+    """Write what was detected, without a camera, aside and then in place."""
+    import h5py
+
+    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+        _write_observations(observations, file.create_group("Calibration/observations"))
+
+
+def load_observations(path: str | os.PathLike[str]) -> Observations:
+    """The observations in a camera file or in a file that ``detect`` wrote.
+
+    Raises
+    ------
+    FileFormatError
+        If the file is damaged, or has no observations in it.
+    """
+    with opened(path) as file:
+        if "Calibration/observations" not in file:
+            raise FileFormatError(f"{path} has no observations in it, so that it cannot be solved again")
+        return _read_observations(file["Calibration/observations"])
+
+
+def _write_observations(observations: Observations, group: "h5py.Group") -> None:
+    board, views = observations.board, observations.views
+    group["image_size"] = np.array(observations.image_size, dtype=np.int32)
+    group["board"] = json.dumps(
+        {"spec": board.spec, "columns": board.columns, "rows": board.rows, "spacing_m": board.spacing_m}
+        | _charuco_fields(board)
+    )
+    group["board_points"] = board.points
+    group["views"] = json.dumps([_view_as_json(view) for view in views])
+    group["corners"] = np.array([len(view.detection) for view in views], dtype=np.int32)
+    group["ids"] = np.concatenate([np.empty(0, dtype=np.int64), *(view.detection.ids for view in views)])
+    group["pixels"] = np.concatenate([np.empty((0, 2)), *(view.detection.pixels for view in views)])
+    for name, shape in zip(OPTIONAL, ((2, 2), (), ()), strict=True):
+        known = [_or_nan(getattr(view.detection, name), (len(view.detection), *shape)) for view in views]
+        group[name] = np.concatenate([np.empty((0, *shape)), *known])
+
+
+def _read_observations(group: "h5py.Group") -> Observations:
+    counts = _array(group, "corners", (None,)).astype(np.int64)
+    if (counts < 0).any():
+        raise FileFormatError(f"{group.file.filename}: a view has a negative number of corners")
+    ends = np.cumsum(counts)[:-1]
+    names = ("ids", "pixels", *OPTIONAL)
+    columns = {name: np.split(np.asarray(read_dataset(group, name)), ends) for name in names}
+    described = _json(group, "views")
+    if len(described) != len(counts):
+        raise FileFormatError(f"{group.file.filename}: {len(described)} views, but corners of {len(counts)}")
+    views = tuple(
+        _view_from_json(entry, {name: columns[name][index] for name in names}) for index, entry in enumerate(described)
+    )
+    width, height = (int(side) for side in read_dataset(group, "image_size"))
+    board = _board_from_json(_json(group, "board"), _array(group, "board_points", (None, 3)))
+    return Observations(board, (width, height), views)
+
+
+def _view_as_json(view: View) -> dict[str, Any]:
+    rejected = [[corner.id, *corner.pixel, corner.reason] for corner in view.detection.rejected]
+    return {
+        "image": view.image,
+        "sha256": view.sha256,
+        "status": view.status,
+        "problems": _problems_as_json(view.problems),
+        "reason": view.detection.reason,
+        "rejected": rejected,
+    }
+
+
+def _view_from_json(entry: Mapping[str, Any], columns: Mapping[str, Floats]) -> View:
+    if entry["status"] not in get_args(Status):
+        raise FileFormatError(f"the view {entry['image']!r} has the unknown status {entry['status']!r}")
+    known = {name: None if np.isnan(columns[name]).all() else columns[name] for name in OPTIONAL}
+    rejected = tuple(RejectedCorner(int(i), (float(x), float(y)), str(why)) for i, x, y, why in entry["rejected"])
+    detection = Detection(
+        columns["ids"].astype(np.int64), columns["pixels"], **known, rejected=rejected, reason=str(entry["reason"])
+    )
+    problems = _problems_from_json(entry["problems"])
+    return View(str(entry["image"]), detection, entry["status"], problems, str(entry["sha256"]))
+
+
+def _charuco_fields(board: Board) -> dict[str, Any]:
+    if not isinstance(board, CharucoBoard):
+        return {}
+    names = ("marker_m", "dictionary", "inverted", "legacy")
+    return {name: getattr(board, name) for name in names}
+
+
+def _board_from_json(entry: Mapping[str, Any], points: Floats) -> Board:
+    """Of its own class where the core knows the kind; of any other kind, what is needed to solve with it."""
+    fields = {name: value for name, value in entry.items() if name != "spec"}
+    kind = str(entry["spec"]).partition(":")[0]
+    if kind == Checkerboard.kind:
+        return Checkerboard(**fields, points=points)
+    if kind == CharucoBoard.kind:
+        return CharucoBoard(**fields, points=points)
+    return RecordedBoard(**fields, recorded_spec=str(entry["spec"]), points=points)
+
+
+def _options_as_json(options: SolveOptions) -> dict[str, Any]:
+    guess = options.guess
+    return {
+        "guess": guess and [guess.name, guess.model, guess.params.tolist(), list(guess.image_size)],
+        "board_shape": options.board_shape,
+        "pixel_aspect": options.pixel_aspect,
+        "weights": options.weights,
+        "robust": options.robust,
+    }
+
+
+def _options_from_json(entry: Mapping[str, Any]) -> SolveOptions:
+    guess = entry["guess"]
+    camera = guess and Camera(str(guess[0]), str(guess[1]), guess[2], (guess[3][0], guess[3][1]))
+    return SolveOptions(camera, entry["board_shape"], entry["pixel_aspect"], entry["weights"], bool(entry["robust"]))
+
+
+def _problems_as_json(problems: tuple[Problem, ...]) -> list[list[str]]:
+    return [[problem.code, problem.message] for problem in problems]
+
+
+def _problems_from_json(entries: list[list[str]]) -> tuple[Problem, ...]:
+    return tuple(Problem(str(code), str(message)) for code, message in entries)
+
+
+def _json(group: "h5py.Group", name: str) -> Any:
+    try:
+        return json.loads(str(read_dataset(group, name)))
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise FileFormatError(f"{group.file.filename}: {group.name}/{name} is not JSON: {error}") from None
+
+
+def _array(group: "h5py.Group", name: str, shape: tuple[int | None, ...]) -> Floats:
+    value = np.asarray(read_dataset(group, name))
+    if value.ndim != len(shape) or any(want not in (None, have) for want, have in zip(shape, value.shape, strict=True)):
+        raise FileFormatError(f"{group.file.filename}: {group.name}/{name} has the unexpected shape {value.shape}")
+    return value.astype(np.float64)
+
+
+def _or_nan(values: Floats | None, shape: tuple[int, ...]) -> Floats:
+    return np.full(shape, np.nan) if values is None else values
