@@ -1,0 +1,141 @@
+"""What every solver does before and after its engine runs: refuse what cannot be solved, and what cannot be true."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from opencsp_calib.arrays import Mask, Params
+from opencsp_calib.board import Board
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.camera import Camera
+from opencsp_calib.detection import Observations, Problem
+from opencsp_calib.errors import CalibrationFailedError, InputError
+from opencsp_calib.interfaces import Solver
+from opencsp_calib.models import lens_model
+from opencsp_calib.options import SolveOptions
+from opencsp_calib.pose import Pose
+
+__all__ = ["ABILITIES", "check_request", "finished"]
+
+ABILITIES = {
+    "guess": "start from a guess",
+    "board_warp": "solve for a warp of the board",
+    "board_free": "solve for the board's shape",
+    "pixel_aspect": "hold the pixel aspect",
+    "weights": "weight corners by their covariance",
+    "robust": "leave out outlying corners",
+}
+MIN_VIEWS = 2  # of a flat board; one view of a plane does not determine a camera
+MIN_CORNERS = 4  # of one view, not on one line
+
+
+def check_request(solver: Solver, observations: Observations, model: str, options: SolveOptions) -> None:
+    """Refuse what a solver is not able to do, and what nobody can solve; engines would guess, crash or ignore it.
+
+    Parameters
+    ----------
+    solver : Solver
+    observations : Observations
+    model : str
+        Name of a lens model.
+    options : SolveOptions
+
+    Raises
+    ------
+    InputError
+        If the solver has not the lens model or an ability asked for, there are too few views or corners, a view has
+        too few corners or all on one line, or a weight is asked for that is not there.
+    """
+    size = len(lens_model(model).parameter_names)
+    if model not in solver.models:
+        able = ", ".join(sorted(solver.models))
+        raise InputError(f"the solver {solver.name!r} has no lens model {model!r}; it has {able}")
+    lacking = sorted(options.asked - solver.abilities)
+    if lacking:
+        raise InputError(f"the solver {solver.name!r} cannot {' or '.join(ABILITIES[name] for name in lacking)}")
+    used = observations.used
+    if len(used) < MIN_VIEWS:
+        raise InputError(f"{len(used)} usable view(s): at least {MIN_VIEWS} are needed, and 10 or more are wise")
+    for view in used:
+        ids = view.detection.ids
+        if len(ids) < MIN_CORNERS or _on_one_line(observations.board.points[ids]):
+            raise InputError(
+                f"{view.image} has {len(ids)} corners; a view needs at least {MIN_CORNERS}, not all on one line: drop it"
+            )
+        if options.weights == "covariance" and view.detection.covariance is None:
+            raise InputError(f"{view.image} has corners without covariance; refine them, or take equal weights")
+    equations = 2 * sum(len(view.detection) for view in used)
+    unknowns = size + 6 * len(used)
+    if equations < unknowns:
+        raise InputError(
+            f"{equations // 2} corners in {len(used)} views are too few for the {unknowns} unknowns of {model!r}; "
+            "take more views or a simpler model"
+        )
+
+
+def finished(
+    solver: Solver,
+    observations: Observations,
+    model: str,
+    options: SolveOptions,
+    params: Params,
+    poses: Sequence[Pose],
+    *,
+    board: Board | None = None,
+    outliers: Sequence[Mask] | None = None,
+    problems: tuple[Problem, ...] = (),
+) -> Calibration:
+    """What an engine found as a `Calibration`, if it can be true.
+
+    Parameters
+    ----------
+    solver, observations, model, options
+        As given to `Solver.solve`.
+    params : (P,)
+        Of the lens model.
+    poses : one per used view
+    board : Board, optional
+        As solved; by default that of the observations.
+    outliers : (n,) bool per used view, optional
+    problems : tuple of Problem
+
+    Raises
+    ------
+    CalibrationFailedError
+        If a number is not finite, a focal length not positive, the principal point further outside of the image than
+        the image is large, or a used corner has no image: behind the camera, or where the lens model folds back.
+    """
+    engine = f"{solver.name} {solver.version()}"
+    advice = "check the board's description and the photographs, add tilted views or take a simpler model"
+    numbers = np.concatenate([params, *(np.concatenate([p.rotation, p.translation]) for p in poses)])
+    if not np.isfinite(numbers).all() or not (params[:2] > 0).all():
+        raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {advice}")
+    size = np.array(observations.image_size)
+    if (np.abs(params[2:4] - size / 2) > 1.5 * size).any():
+        x, y = params[2:4]
+        message = f"{engine} puts the principal point at ({x:.0f}, {y:.0f}), far outside of the image: {advice}"
+        raise CalibrationFailedError(message)
+    name = options.guess.name if options.guess else "camera"
+    calibration = Calibration(
+        camera=Camera(name, model, params, observations.image_size),
+        observations=observations,
+        cam_from_board=tuple(poses),
+        board=board or observations.board,
+        solver=engine,
+        options=options,
+        outliers=outliers,  # type: ignore[arg-type]  # None: none
+        problems=problems,
+    )
+    for view, residuals, outlying in zip(observations.used, calibration.residuals, calibration.outliers, strict=True):
+        lost = int(np.isnan(residuals[~outlying]).any(axis=1).sum())
+        if lost:
+            raise CalibrationFailedError(
+                f"{engine} found a camera that cannot see {lost} of the corners of {view.image}: they are behind it, "
+                f"or where {model!r} folds back; {advice}"
+            )
+    return calibration
+
+
+def _on_one_line(points: np.ndarray) -> bool:  # type: ignore[type-arg]  # (n, 3) m
+    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(spread[1] <= 1e-6 * spread[0])

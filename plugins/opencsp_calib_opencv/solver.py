@@ -1,0 +1,140 @@
+"""The solver ``opencv``: ``cv2.calibrateCamera``, and ``cv2.fisheye.calibrate`` for fisheye."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from opencsp_calib import CalibrationFailedError, InputError, Observations, Pose, SolveOptions
+from opencsp_calib.arrays import Params
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.initial import initial_camera
+from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.solving import check_request, finished
+
+__all__ = ["OpenCVSolver"]
+
+ITERATIONS = 1000
+SMALLEST_STEP = 2.3e-16
+"""OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
+up to 1e-8 px short. It has no test of the gradient."""
+
+
+class OpenCVSolver:
+    """OpenCV's own calibration, equal weights, flat or measured board held as it is.
+
+    OpenCV takes pixels and, but for fisheye, board points in single precision only. Board points are given in units
+    of the spacing, where those of an even board are exact; those of a measured one are rounded by at most 1e-6 of the
+    spacing. Pixels beyond 1024 are rounded by up to 6e-5 px, at random.
+    """
+
+    name = "opencv"
+    models = frozenset(LENS_MODELS)
+    abilities = frozenset({"guess", "pixel_aspect"})
+
+    def missing(self) -> str | None:
+        """See `Provided.missing`."""
+        return None if find_spec("cv2") else "OpenCV is not installed: pip install opencsp-calib[opencv]"
+
+    def version(self) -> str:
+        """See `Solver.version`."""
+        import cv2
+
+        return str(cv2.__version__)
+
+    def solve(self, observations: Observations, model: str, options: SolveOptions) -> Calibration:
+        """See `Solver.solve`."""
+        check_request(self, observations, model, options)
+        engine = _solve_fisheye if model == "opencv_fisheye" else _solve_pinhole
+        params, poses = engine(observations, model, options)
+        return finished(self, observations, model, options, params, poses)
+
+
+def _solve_pinhole(observations: Observations, model: str, options: SolveOptions) -> tuple[Params, tuple[Pose, ...]]:
+    import cv2
+
+    count = len(LENS_MODELS[model].distortion_names)
+    matrix, distortion = np.eye(3), np.zeros(max(count, 5))
+    flags = _coefficient_flags(cv2, count)
+    if options.pixel_aspect is not None:
+        matrix[1, 1] = options.pixel_aspect
+        flags |= cv2.CALIB_FIX_ASPECT_RATIO
+    if options.guess or observations.board.points[:, 2].any():  # OpenCV finds a start for itself only if all z are 0
+        start = initial_camera(observations, model, options.guess, options.pixel_aspect)
+        matrix, distortion[:count] = start.matrix, start.distortion
+        flags |= cv2.CALIB_USE_INTRINSIC_GUESS
+    points, pixels = _vendor_points(observations, np.float32)
+    with _vendor_errors(cv2, observations):
+        _, matrix, distortion, rotations, translations = cv2.calibrateCamera(
+            points, pixels, observations.image_size, matrix, distortion, flags=flags, criteria=_criteria(cv2)
+        )
+    return _unpacked(observations, matrix, np.ravel(distortion)[:count], rotations, translations)
+
+
+def _solve_fisheye(observations: Observations, model: str, options: SolveOptions) -> tuple[Params, tuple[Pose, ...]]:
+    import cv2
+
+    if options.pixel_aspect is not None:
+        raise InputError("OpenCV cannot hold the pixel aspect of a fisheye; leave it free or take another solver")
+    start = initial_camera(observations, model, options.guess)
+    flags = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV 5 has moved them
+    points, pixels = _vendor_points(observations, np.float64)
+    with _vendor_errors(cv2, observations):
+        _, matrix, distortion, rotations, translations = cv2.fisheye.calibrate(
+            [p[:, None] for p in points],
+            [p[:, None] for p in pixels],
+            observations.image_size,
+            start.matrix,
+            start.distortion.copy(),
+            # without new extrinsics at each step OpenCV's iteration wanders off even from exact data
+            flags=flags.CALIB_FIX_SKEW | flags.CALIB_RECOMPUTE_EXTRINSIC | flags.CALIB_USE_INTRINSIC_GUESS,
+            criteria=_criteria(cv2),
+        )
+    return _unpacked(observations, matrix, np.ravel(distortion), rotations, translations)
+
+
+def _coefficient_flags(cv2: ModuleType, count: int) -> int:
+    """What makes OpenCV solve for the first `count` of its coefficients and no others."""
+    flags = {
+        0: cv2.CALIB_ZERO_TANGENT_DIST | cv2.CALIB_FIX_K1 | cv2.CALIB_FIX_K2 | cv2.CALIB_FIX_K3,
+        4: cv2.CALIB_FIX_K3,
+        5: 0,
+        8: cv2.CALIB_RATIONAL_MODEL,
+        12: cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL,
+        14: cv2.CALIB_RATIONAL_MODEL | cv2.CALIB_THIN_PRISM_MODEL | cv2.CALIB_TILTED_MODEL,
+    }
+    return int(flags[count])
+
+
+def _criteria(cv2: ModuleType) -> tuple[int, int, float]:
+    return cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, ITERATIONS, SMALLEST_STEP
+
+
+def _vendor_points(observations: Observations, kind: type) -> tuple[list[Any], list[Any]]:
+    """Board points (n, 3) in units of the spacing, and pixels (n, 2), of every used view."""
+    board = observations.board
+    points = [(board.points[d.ids] / board.spacing_m).astype(kind) for d in observations.detections]
+    return points, [d.pixels.astype(kind) for d in observations.detections]
+
+
+def _unpacked(
+    observations: Observations, matrix: Any, distortion: Any, rotations: Any, translations: Any
+) -> tuple[Params, tuple[Pose, ...]]:
+    params = np.concatenate([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]], distortion])
+    spacing = observations.board.spacing_m
+    pairs = zip(rotations, translations, strict=True)
+    return params, tuple(Pose(np.ravel(r), np.ravel(t) * spacing) for r, t in pairs)
+
+
+@contextmanager
+def _vendor_errors(cv2: ModuleType, observations: Observations) -> Iterator[None]:
+    """OpenCV's errors as ours: its own are several lines long and tell of its source files."""
+    try:
+        yield
+    except cv2.error as error:
+        said = " ".join(str(error.err).split())
+        message = f"OpenCV found no solution from {len(observations.used)} views: {said}"
+        raise CalibrationFailedError(message) from error
