@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opencsp_calib.arrays import Mask, Params
+from opencsp_calib.arrays import Floats, Mask, Params, Points
 from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
@@ -60,7 +60,7 @@ def check_request(solver: Solver, observations: Observations, model: str, option
         ids = view.detection.ids
         if len(ids) < MIN_CORNERS or _on_one_line(observations.board.points[ids]):
             raise InputError(
-                f"{view.image} has {len(ids)} corners; a view needs at least {MIN_CORNERS}, not all on one line: drop it"
+                f"{view.image} has {len(ids)} corners; a view needs {MIN_CORNERS}, not all on one line; drop it"
             )
         if options.weights == "covariance" and view.detection.covariance is None:
             raise InputError(f"{view.image} has corners without covariance; refine them, or take equal weights")
@@ -79,7 +79,8 @@ def finished(
     model: str,
     options: SolveOptions,
     params: Params,
-    poses: Sequence[Pose],
+    rotations: Floats,
+    translations: Floats,
     *,
     board: Board | None = None,
     outliers: Sequence[Mask] | None = None,
@@ -93,7 +94,9 @@ def finished(
         As given to `Solver.solve`.
     params : (P,)
         Of the lens model.
-    poses : one per used view
+    rotations : (V, 3) rad
+        Rotation vectors, one per used view, of the board to the camera.
+    translations : (V, 3) m
     board : Board, optional
         As solved; by default that of the observations.
     outliers : (n,) bool per used view, optional
@@ -107,7 +110,7 @@ def finished(
     """
     engine = f"{solver.name} {solver.version()}"
     advice = "check the board's description and the photographs, add tilted views or take a simpler model"
-    numbers = np.concatenate([params, *(np.concatenate([p.rotation, p.translation]) for p in poses)])
+    numbers = np.concatenate([params, np.ravel(rotations), np.ravel(translations)])
     if not np.isfinite(numbers).all() or not (params[:2] > 0).all():
         raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {advice}")
     size = np.array(observations.image_size)
@@ -119,11 +122,11 @@ def finished(
     calibration = Calibration(
         camera=Camera(name, model, params, observations.image_size),
         observations=observations,
-        cam_from_board=tuple(poses),
+        cam_from_board=tuple(Pose(r, t) for r, t in zip(rotations, translations, strict=True)),
         board=board or observations.board,
         solver=engine,
         options=options,
-        outliers=outliers,  # type: ignore[arg-type]  # None: none
+        outliers=outliers,  # type: ignore[arg-type]  # None stands for none
         problems=problems,
     )
     for view, residuals, outlying in zip(observations.used, calibration.residuals, calibration.outliers, strict=True):
@@ -136,6 +139,6 @@ def finished(
     return calibration
 
 
-def _on_one_line(points: np.ndarray) -> bool:  # type: ignore[type-arg]  # (n, 3) m
+def _on_one_line(points: Points) -> bool:
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     return bool(spread[1] <= 1e-6 * spread[0])

@@ -2,25 +2,28 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from opencsp_calib import CalibrationFailedError, InputError, Observations, Pose, SolveOptions
-from opencsp_calib.arrays import Params
+from opencsp_calib import CalibrationFailedError, InputError, Observations, SolveOptions
+from opencsp_calib.arrays import Floats, Params
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.solving import check_request, finished
+from opencsp_calib_opencv.available import missing_opencv
 
 __all__ = ["OpenCVSolver"]
 
-ITERATIONS = 1000
+ITERATIONS = 300
 SMALLEST_STEP = 2.3e-16
 """OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
 up to 1e-8 px short. It has no test of the gradient."""
+
+
+Solution: TypeAlias = tuple[Params, Floats, Floats]  # of the lens model; rotations and translations (V, 3)
 
 
 class OpenCVSolver:
@@ -37,7 +40,7 @@ class OpenCVSolver:
 
     def missing(self) -> str | None:
         """See `Provided.missing`."""
-        return None if find_spec("cv2") else "OpenCV is not installed: pip install opencsp-calib[opencv]"
+        return missing_opencv()
 
     def version(self) -> str:
         """See `Solver.version`."""
@@ -49,11 +52,10 @@ class OpenCVSolver:
         """See `Solver.solve`."""
         check_request(self, observations, model, options)
         engine = _solve_fisheye if model == "opencv_fisheye" else _solve_pinhole
-        params, poses = engine(observations, model, options)
-        return finished(self, observations, model, options, params, poses)
+        return finished(self, observations, model, options, *engine(observations, model, options))
 
 
-def _solve_pinhole(observations: Observations, model: str, options: SolveOptions) -> tuple[Params, tuple[Pose, ...]]:
+def _solve_pinhole(observations: Observations, model: str, options: SolveOptions) -> Solution:
     import cv2
 
     count = len(LENS_MODELS[model].distortion_names)
@@ -74,7 +76,7 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
     return _unpacked(observations, matrix, np.ravel(distortion)[:count], rotations, translations)
 
 
-def _solve_fisheye(observations: Observations, model: str, options: SolveOptions) -> tuple[Params, tuple[Pose, ...]]:
+def _solve_fisheye(observations: Observations, model: str, options: SolveOptions) -> Solution:
     import cv2
 
     if options.pixel_aspect is not None:
@@ -84,8 +86,8 @@ def _solve_fisheye(observations: Observations, model: str, options: SolveOptions
     points, pixels = _vendor_points(observations, np.float64)
     with _vendor_errors(cv2, observations):
         _, matrix, distortion, rotations, translations = cv2.fisheye.calibrate(
-            [p[:, None] for p in points],
-            [p[:, None] for p in pixels],
+            [p[None] for p in points],  # one row each: OpenCV 5 fails on columns
+            [p[None] for p in pixels],
             observations.image_size,
             start.matrix,
             start.distortion.copy(),
@@ -116,17 +118,14 @@ def _criteria(cv2: ModuleType) -> tuple[int, int, float]:
 def _vendor_points(observations: Observations, kind: type) -> tuple[list[Any], list[Any]]:
     """Board points (n, 3) in units of the spacing, and pixels (n, 2), of every used view."""
     board = observations.board
-    points = [(board.points[d.ids] / board.spacing_m).astype(kind) for d in observations.detections]
+    points: list[Any] = [(board.points[d.ids] / board.spacing_m).astype(kind) for d in observations.detections]
     return points, [d.pixels.astype(kind) for d in observations.detections]
 
 
-def _unpacked(
-    observations: Observations, matrix: Any, distortion: Any, rotations: Any, translations: Any
-) -> tuple[Params, tuple[Pose, ...]]:
+def _unpacked(observations: Observations, matrix: Any, distortion: Any, rotations: Any, translations: Any) -> Solution:
     params = np.concatenate([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]], distortion])
-    spacing = observations.board.spacing_m
-    pairs = zip(rotations, translations, strict=True)
-    return params, tuple(Pose(np.ravel(r), np.ravel(t) * spacing) for r, t in pairs)
+    rotations, translations = (np.reshape(vectors, (-1, 3)) for vectors in (rotations, translations))
+    return params, rotations, translations * observations.board.spacing_m
 
 
 @contextmanager
