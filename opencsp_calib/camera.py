@@ -6,7 +6,7 @@ from os import PathLike
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from opencsp_calib.arrays import Floats, Matrix, Params, Pixels, Points, checked, frozen
 from opencsp_calib.errors import InputError
@@ -148,11 +148,11 @@ class Camera:
         offset[2:4] = x, y
         return replace(self, params=self.params - offset, image_size=(width, height))
 
-    def undistort(self, image: Floats, camera: "Camera | None" = None) -> Floats:
+    def undistort(self, image: NDArray[Any], target: "Camera | None" = None) -> NDArray[Any]:
         """An image as a pinhole camera would have taken it; see `opencsp_calib.images.undistort`."""
         from opencsp_calib.images import undistort
 
-        return undistort(image, self, camera)
+        return undistort(image, self, target)
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write a camera file that OpenCSP reads too; see `opencsp_calib.hdf5`."""

@@ -17,8 +17,9 @@ checksum is missing or wrong though it has a ``format_version`` is refused.
 """
 
 import hashlib
+import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -34,15 +35,24 @@ from opencsp_calib.errors import FileFormatError, InputError
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["FORMAT_VERSION", "load_camera", "opened", "read_camera", "read_dataset", "save_camera", "write_camera"]
+__all__ = [
+    "FORMAT_VERSION",
+    "load_camera",
+    "load_record",
+    "opened",
+    "read_camera",
+    "read_dataset",
+    "save_camera",
+    "write_camera",
+]
 
 FORMAT_VERSION = 1
 MODEL_BY_COEFFICIENTS = {4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
 MAX_VALUES = 50_000_000  # in one dataset; more is a damaged or hostile file
 
 
-def save_camera(camera: Camera, path: str | os.PathLike[str]) -> None:
-    """Write a camera file without a calibration.
+def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[str, str] | None = None) -> None:
+    """Write a camera file without a calibration, maybe with notes about the camera.
 
     Raises
     ------
@@ -53,6 +63,17 @@ def save_camera(camera: Camera, path: str | os.PathLike[str]) -> None:
 
     with replacing(path) as temporary, h5py.File(temporary, "w") as file:
         write_camera(camera, file)
+        if record:
+            file["Calibration/record"] = json.dumps(dict(record))
+
+
+def load_record(path: str | os.PathLike[str]) -> dict[str, str]:
+    """The notes kept with a camera: focus, aperture, how it was imported."""
+    with opened(path) as file:
+        if "Calibration/record" not in file:
+            return {}
+        record = json.loads(str(read_dataset(file["Calibration"], "record")))
+        return {str(key): str(value) for key, value in record.items()}
 
 
 def load_camera(path: str | os.PathLike[str]) -> Camera:

@@ -26,8 +26,8 @@ class Registry:
     Parameters
     ----------
     boards, detectors, solvers, camera_formats, image_sources : mapping of str to the object of that name
-    origins : mapping of str to str
-        For ``"solver bundle"`` and the like, the entry point that provides it.
+    origins : mapping of (str, str) to str
+        For ``("solvers", "bundle")`` and the like, the plugin that provides it.
     """
 
     boards: Mapping[str, BoardKind]
@@ -35,7 +35,7 @@ class Registry:
     solvers: Mapping[str, Solver]
     camera_formats: Mapping[str, CameraFormat]
     image_sources: Mapping[str, ImageSource]
-    origins: Mapping[str, str]
+    origins: Mapping[tuple[str, str], str]
 
     def detector(self, name: str) -> Detector:
         """The detector of that name, able to run; PluginError or MissingDependencyError otherwise."""
@@ -62,8 +62,9 @@ class Registry:
         return self.boards[kind].parse(spec)
 
     def detector_for(self, board: Board) -> Detector:
-        """The first detector, by name, that looks for such a board; able to run."""
-        fitting = [d for _, d in sorted(self.detectors.items()) if d.supports(board)]
+        """The detector named as the board's kind, else the first by name that looks for such a board; able to run."""
+        ordered = sorted(self.detectors.values(), key=lambda d: (d.name != board.kind, d.name))
+        fitting = [d for d in ordered if d.supports(board)]
         able = [d for d in fitting if d.missing() is None]
         if able:
             return able[0]
@@ -98,7 +99,7 @@ def load(points: Iterable[EntryPoint]) -> Registry:
         except Exception as error:  # a stranger's code: whatever it does must not stop ours
             message = f"plugin {point.name!r} ({point.value}) was left out, it cannot be loaded: {error!r}"
             warnings.warn(message, PluginWarning, stacklevel=2)
-    origins: dict[str, str] = {}
+    origins: dict[tuple[str, str], str] = {}
     return Registry(
         boards=_collect(manager, "boards", BoardKind, "board kind", origins),
         detectors=_collect(manager, "detectors", Detector, "detector", origins),
@@ -110,7 +111,7 @@ def load(points: Iterable[EntryPoint]) -> Registry:
 
 
 def _collect(
-    manager: pluggy.PluginManager, hook: str, contract: Any, what: str, origins: dict[str, str]
+    manager: pluggy.PluginManager, hook: str, contract: Any, what: str, origins: dict[tuple[str, str], str]
 ) -> dict[str, Any]:
     found: dict[str, Any] = {}
     for implementation in getattr(manager.hook, hook).get_hookimpls():
@@ -125,8 +126,8 @@ def _collect(
                 warnings.warn(f"plugin {plugin} gives a {what} that is none: {provided!r}", PluginWarning, stacklevel=3)
                 continue
             if provided.name in found:
-                both = f"{origins[f'{what} {provided.name}']} and {plugin}"
+                both = f"{origins[hook, provided.name]} and {plugin}"
                 raise PluginError(f"two plugins provide a {what} called {provided.name!r}: {both}; uninstall one")
             found[provided.name] = provided
-            origins[f"{what} {provided.name}"] = plugin
+            origins[hook, provided.name] = plugin
     return found

@@ -1,0 +1,68 @@
+"""The command line, ``opencsp-calib``: a thin face of the pipeline.
+
+Exit codes: 0 done; 1 the calibration failed, or a verdict is negative; 2 bad use or bad input. What is for people goes
+to standard error; ``--json`` puts one JSON object, and nothing else, on standard output.
+"""
+
+import os
+import sys
+
+import typer
+
+from opencsp_calib.cli import calibrating, cameras, checking, setting_up
+from opencsp_calib.cli.console import complain
+from opencsp_calib.cli.setting_up import print_versions
+from opencsp_calib.errors import CalibError
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="opencsp-calib",
+    help="Camera calibration that a metrologist trusts and a newcomer gets right the first time.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for module in (calibrating, cameras, checking, setting_up):
+    for command in module.COMMANDS:
+        app.command()(command)
+
+
+@app.callback(invoke_without_command=True)
+def options(
+    show_version: bool = typer.Option(False, "--version", help="Print the version, and those of the engines."),
+) -> None:
+    """Camera calibration that a metrologist trusts and a newcomer gets right the first time."""
+    if show_version:
+        print_versions()
+        raise typer.Exit
+
+
+def main() -> None:
+    """Run the command line; whatever goes wrong ends in one line and an exit code."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command, and give its exit code."""
+    try:
+        outcome = app(arguments, standalone_mode=False)
+    except CalibError as error:
+        complain(str(error))
+        return error.exit_code
+    except KeyboardInterrupt:
+        complain("stopped; nothing was written")
+        return 1
+    except BrokenPipeError:  # the reader of our output has gone, as `| head` does: nobody is left to tell
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except MemoryError:
+        complain("there is not enough memory for this; use fewer --jobs, or smaller images")
+        return 2
+    except Exception as error:
+        if not hasattr(error, "format_message"):  # not the argument parser's: a defect of ours, shown whole
+            raise
+        complain(error.format_message())
+        return 2
+    return outcome if isinstance(outcome, int) else 0

@@ -1,0 +1,128 @@
+"""The arguments that several commands share."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+
+import typer
+
+from opencsp_calib.errors import InputError
+
+if TYPE_CHECKING:
+    from opencsp_calib.board import Board
+    from opencsp_calib.camera import Camera
+    from opencsp_calib.pipeline import PixelAspect
+
+SOLVING = "Solving"
+OUTPUT = "Output"
+
+Images = Annotated[list[str], typer.Argument(metavar="IMAGES...", help="Image files, folders, or glob patterns.")]
+BoardSpec = Annotated[
+    str,
+    typer.Option(
+        "--board",
+        metavar="SPEC",
+        help="checkerboard:COLUMNSxROWS:SIZE (inner corners, such as checkerboard:18x23:50mm), "
+        "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:inverted][:legacy] (squares), or a board file.",
+    ),
+]
+OptionalBoardSpec = Annotated[
+    str | None, typer.Option("--board", metavar="SPEC", help="The board, where IMAGES are photographs.")
+]
+Json = Annotated[bool, typer.Option("--json", help="One JSON object on standard output.", rich_help_panel=OUTPUT)]
+Output = Annotated[
+    Path | None,
+    typer.Option("-o", "--output", metavar="FILE", help="The camera file to write.", rich_help_panel=OUTPUT),
+]
+Report = Annotated[Path | None, typer.Option(metavar="FILE", help="An HTML report to write.", rich_help_panel=OUTPUT)]
+Jobs = Annotated[int | None, typer.Option(min=1, metavar="N", help="Images at a time; by default one a core.")]
+DetectorName = Annotated[str | None, typer.Option("--detector", metavar="NAME", help="Which detector looks for it.")]
+RefineBy = Annotated[
+    Literal["none", "subpix", "model"] | None,
+    typer.Option(help="How corners are located: as found, by OpenCV's search, or by fitting the image of a corner."),
+]
+Model = Annotated[
+    str | None, typer.Option(metavar="MODEL", help="The lens model.", show_default="opencv4", rich_help_panel=SOLVING)
+]
+SolverName = Annotated[
+    str | None, typer.Option("--solver", metavar="NAME", show_default="bundle", rich_help_panel=SOLVING)
+]
+BoardShapeOption = Annotated[
+    Literal["flat", "warp", "free", "auto"] | None,
+    typer.Option(
+        "--board-shape",
+        help="Take the board as flat, with a smooth warp, or solve for every corner; auto decides from the data.",
+        show_default="auto",
+        rich_help_panel=SOLVING,
+    ),
+]
+PixelAspectOption = Annotated[
+    str | None,
+    typer.Option(
+        "--pixel-aspect",
+        metavar="free|square|RATIO",
+        help="Whether fx and fy are independent, equal, or in the ratio fy/fx.",
+        show_default="free",
+        rich_help_panel=SOLVING,
+    ),
+]
+WeightsOption = Annotated[
+    Literal["equal", "covariance"] | None,
+    typer.Option("--weights", help="By default covariance for bundle, else equal.", rich_help_panel=SOLVING),
+]
+RobustOption = Annotated[
+    bool | None,
+    typer.Option(
+        "--robust/--no-robust", help="Leave out outlying corners; default for bundle.", rich_help_panel=SOLVING
+    ),
+]
+GuessOption = Annotated[
+    Path | None,
+    typer.Option("--guess", metavar="CAMERA", help="A camera file to start from.", rich_help_panel=SOLVING),
+]
+
+
+def board_from(text: str) -> "Board":
+    """The board of a SPEC: a one-line description, a board file, or the solved board of a camera file."""
+    from opencsp_calib.board_file import read_board_file
+    from opencsp_calib.hdf5_calibration import load_calibration
+    from opencsp_calib.registry import installed
+
+    path = Path(text)
+    if path.suffix.lower() in (".json", ".h5", ".hdf5"):
+        if not path.is_file():
+            raise InputError(f"no such board file: {path}")
+        return read_board_file(path, installed().board) if path.suffix == ".json" else load_calibration(path).board
+    return installed().board(text)
+
+
+def aspect_from(text: str | None) -> "PixelAspect | None":
+    """What ``--pixel-aspect`` says."""
+    if text is None or text in ("free", "square"):
+        return cast("PixelAspect | None", text)
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"--pixel-aspect takes free, square or a number (fy/fx), not {text!r}") from None
+
+
+def guess_from(path: Path | None) -> "Camera | None":
+    """The camera that ``--guess`` names, in any format we read."""
+    from opencsp_calib.cli.cameras import camera_in
+
+    return None if path is None else camera_in(path)
+
+
+def notes_from(pairs: list[str]) -> dict[str, str]:
+    """What ``--note KEY=VALUE`` says."""
+    notes = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not (equals and key.strip()):
+            raise InputError(f"--note takes KEY=VALUE, such as --note aperture=f/8, not {pair!r}")
+        notes[key.strip()] = value.strip()
+    return notes
+
+
+def given(**options: Any) -> dict[str, Any]:
+    """Only the options that were given, so that defaults stay in one place."""
+    return {name: value for name, value in options.items() if value is not None}

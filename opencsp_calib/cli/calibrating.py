@@ -1,0 +1,267 @@
+"""The commands that calibrate: calibrate, detect, solve."""
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from opencsp_calib.cli import arguments as args
+from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table
+from opencsp_calib.errors import InputError
+
+if TYPE_CHECKING:
+    from opencsp_calib.calibration import Calibration
+    from opencsp_calib.detection import Observations
+
+PRESET_OPENCSP = {
+    "detector": "opencsp",
+    "refine": "none",
+    "solver": "opencv",
+    "model": "opencv4",
+    "board_shape": "flat",
+    "pixel_aspect": "free",
+    "weights": "equal",
+    "robust": False,
+}
+"""Exactly what OpenCSP's own calibration does."""
+
+
+def calibrate(
+    images: args.Images,
+    board: args.BoardSpec,
+    name: Annotated[str | None, typer.Option(help="The camera's name; by default the folder's.")] = None,
+    detector: args.DetectorName = None,
+    refine: args.RefineBy = None,
+    model: args.Model = None,
+    solver: args.SolverName = None,
+    board_shape: args.BoardShapeOption = None,
+    pixel_aspect: args.PixelAspectOption = None,
+    weights: args.WeightsOption = None,
+    robust: args.RobustOption = None,
+    guess: args.GuessOption = None,
+    preset: Annotated[
+        Literal["opencsp"] | None, typer.Option(help="Do exactly what OpenCSP's own calibration does.")
+    ] = None,
+    exclude: Annotated[list[str] | None, typer.Option(metavar="NAME", help="Leave out an image.")] = None,
+    drop_worst: Annotated[int, typer.Option(min=0, metavar="N", help="Leave out the N worst views, solve again.")] = 0,
+    max_rms: Annotated[
+        float | None, typer.Option(min=0, metavar="PX", help="Leave out views above this rms, solve again.")
+    ] = None,
+    pixel_pitch: Annotated[
+        float | None, typer.Option(min=0.01, metavar="UM", help="Size of a pixel, to show focal length in mm.")
+    ] = None,
+    note: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=VALUE", help="To keep with the camera: focus, aperture ...")
+    ] = None,
+    jobs: args.Jobs = None,
+    output: args.Output = None,
+    report: args.Report = None,
+    json: args.Json = False,
+) -> None:
+    """Calibrate a camera from photographs of a board."""
+    from opencsp_calib import dropping, pipeline
+    from opencsp_calib.images import find_images
+
+    _check_targets(output, report)
+    options = _preset(
+        preset,
+        detector=detector,
+        refine=refine,
+        model=model,
+        solver=solver,
+        board_shape=board_shape,
+        pixel_aspect=args.aspect_from(pixel_aspect),
+        weights=weights,
+        robust=robust,
+    )
+    finding = {key: options.pop(key) for key in ("detector", "refine") if key in options}
+    started = time.perf_counter()
+    target = args.board_from(board)
+    files = find_images(images)
+    record = _record(note or [], pixel_pitch)
+    with detection_progress() as progress:
+        observations = pipeline.detect(images, target, jobs=jobs, progress=progress, **finding)
+    detected = time.perf_counter()
+    provenance = {"images": {file.name: str(file.path.absolute()) for file in files}}
+    options |= args.given(guess=args.guess_from(guess))
+    options |= {"name": name or files[0].path.absolute().parent.name, "record": record, "provenance": provenance}
+
+    def run(views: "Observations") -> "Calibration":
+        return pipeline.solve(views, **options)
+
+    observations = dropping.excluding(observations, exclude or [])
+    first = run(observations)
+    result = dropping.drop_worst(first, drop_worst, run) if drop_worst else first
+    result = dropping.drop_above(result, max_rms, run) if max_rms is not None else result
+    solved = time.perf_counter()
+    seconds = {"detect": detected - started, "solve": solved - detected, "total": solved - started}
+    before = first if result is not first else None
+    _finish(result, before, seconds, output, report, json)
+
+
+def detect(
+    images: args.Images,
+    board: args.BoardSpec,
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="The observations file to write.")],
+    detector: args.DetectorName = None,
+    refine: args.RefineBy = None,
+    jobs: args.Jobs = None,
+    json: args.Json = False,
+) -> None:
+    """Find the board in photographs, and keep what was found for `solve`."""
+    from opencsp_calib import pipeline
+    from opencsp_calib.atomic import check_writable
+    from opencsp_calib.hdf5_calibration import save_observations
+    from opencsp_calib.summary import observations_as_json
+
+    check_writable(output)
+    started = time.perf_counter()
+    with detection_progress() as progress:
+        found = pipeline.detect(
+            images, args.board_from(board), jobs=jobs, progress=progress, detector=detector, refine=refine
+        )
+    save_observations(found, output)
+    seconds = {"detect": time.perf_counter() - started}
+    say(f"{_count(found)}; saved {output}")
+    if json:
+        print_json(observations_as_json(found, seconds, str(output)))
+
+
+def solve(
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="An observations file, or a camera file to solve again.")
+    ],
+    model: args.Model = None,
+    solver: args.SolverName = None,
+    board_shape: args.BoardShapeOption = None,
+    pixel_aspect: args.PixelAspectOption = None,
+    weights: args.WeightsOption = None,
+    robust: args.RobustOption = None,
+    guess: args.GuessOption = None,
+    output: args.Output = None,
+    report: args.Report = None,
+    json: args.Json = False,
+) -> None:
+    """Solve again from what `detect` or `calibrate` kept; a camera file repeats its own run unless told otherwise."""
+    from opencsp_calib import pipeline
+    from opencsp_calib.hdf5_calibration import load_observations
+
+    _check_targets(output, report)
+    observations = load_observations(file)
+    asked = args.given(
+        model=model,
+        solver=solver,
+        board_shape=board_shape,
+        pixel_aspect=args.aspect_from(pixel_aspect),
+        weights=weights,
+        robust=robust,
+        guess=args.guess_from(guess),
+    )
+    started = time.perf_counter()
+    result = pipeline.solve(observations, **{"name": file.stem, **_as_before(file), **asked})
+    seconds = {"detect": 0.0, "solve": time.perf_counter() - started, "total": time.perf_counter() - started}
+    _finish(result, None, seconds, output, report, json)
+
+
+COMMANDS = (calibrate, detect, solve)
+
+
+def _as_before(file: Path) -> dict[str, Any]:
+    """How a camera file was solved; nothing for a file of observations only."""
+    from opencsp_calib.hdf5 import opened
+    from opencsp_calib.hdf5_calibration import load_calibration
+
+    with opened(file) as content:
+        if "Camera" not in content:
+            return {}
+    before = load_calibration(file)
+    options = before.options
+    return {
+        "model": before.camera.model,
+        "solver": before.solver.split()[0],
+        "board_shape": options.board_shape,
+        "pixel_aspect": "free" if options.pixel_aspect is None else options.pixel_aspect,
+        "weights": options.weights,
+        "robust": options.robust,
+        "guess": options.guess,
+        "name": before.camera.name,
+        "record": before.record,
+        "provenance": {key: before.provenance[key] for key in ("images",) if key in before.provenance},
+    }
+
+
+def _preset(preset: str | None, **options: Any) -> dict[str, Any]:
+    asked = args.given(**options)
+    if preset is None:
+        return asked
+    for key, value in asked.items():
+        if value != PRESET_OPENCSP[key]:
+            flag = "--" + key.replace("_", "-")
+            raise InputError(
+                f"--preset {preset} means {flag} {PRESET_OPENCSP[key]}; leave {flag} {value} or the preset"
+            )
+    return dict(PRESET_OPENCSP)
+
+
+def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
+    from opencsp_calib.summary import PIXEL_PITCH
+
+    record = args.notes_from(notes)
+    return record | ({PIXEL_PITCH: f"{pixel_pitch:g}"} if pixel_pitch else {})
+
+
+def _check_targets(*paths: Path | None) -> None:
+    """Before any work: whether its results can be written."""
+    from opencsp_calib.atomic import check_writable
+
+    for path in paths:
+        if path is not None:
+            check_writable(path)
+
+
+def _finish(
+    result: "Calibration",
+    before: "Calibration | None",
+    seconds: dict[str, float],
+    output: Path | None,
+    report: Path | None,
+    json: bool,
+) -> None:
+    """Save, report, and tell."""
+    from opencsp_calib.hdf5_calibration import save_calibration
+    from opencsp_calib.quality import judge
+    from opencsp_calib.report import write_report
+    from opencsp_calib.summary import calibration_as_json
+
+    if output:
+        save_calibration(result, output)
+    if report:
+        write_report(result, report, before=before)
+    _say_result(result, before)
+    say_problems(judge(result))
+    for what, path in (("camera", output), ("report", report)):
+        if path:
+            say(f"{what} saved: {path}")
+    if not output:
+        say("nothing was saved; add -o camera.h5")
+    if json:
+        print_json(calibration_as_json(result, seconds, str(output) if output else None))
+
+
+def _say_result(result: "Calibration", before: "Calibration | None") -> None:
+    from opencsp_calib.summary import parameter_lines
+
+    camera = result.camera
+    size = "x".join(map(str, camera.image_size))
+    say(f"{camera.name}: {camera.model}, {size}, {result.solver}, board {result.options.board_shape}")
+    rejected = f", {result.rejected_corners} corners rejected" if result.rejected_corners else ""
+    say(f"{_count(result.observations)}, rms {result.rms_px:.4f} px{rejected}")
+    if before is not None:
+        say(f"before images were dropped: {_count(before.observations)}, rms {before.rms_px:.4f} px")
+    say_table(("parameter", "value", "±1 sigma"), parameter_lines(camera, result.sigma, result.record))
+
+
+def _count(observations: "Observations") -> str:
+    corners = sum(len(detection) for detection in observations.detections)
+    return f"{len(observations.used)} of {len(observations.views)} images used, {corners} corners"

@@ -1,0 +1,83 @@
+"""Where the command line's words go: people read standard error, programs read standard output."""
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from opencsp_calib.detecting import Progress
+    from opencsp_calib.detection import Problem, View
+
+__all__ = ["complain", "detection_progress", "print_json", "progress_bar", "say", "say_problems", "say_table"]
+
+
+def say(text: str) -> None:
+    """A line for people."""
+    _console().print(text)
+
+
+def complain(text: str) -> None:
+    """The one line that says what went wrong."""
+    line = " ".join(text.split())
+    say(f"error: {line}")
+
+
+def say_problems(problems: "tuple[Problem, ...]") -> None:
+    """Warnings, each on a line with its code."""
+    for problem in problems:
+        say(f"warning [{problem.code}] {problem.message}")
+
+
+def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
+    """A table for people."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
+    for index, title in enumerate(header):
+        table.add_column(title, justify="left" if index == 0 else "right", no_wrap=index == 0)
+    for row in rows:
+        table.add_row(*row)
+    _console().print(table, soft_wrap=False)
+
+
+def print_json(content: Any) -> None:
+    """One JSON object on standard output."""
+    sys.stdout.write(json.dumps(content, indent=1, allow_nan=False) + "\n")
+    sys.stdout.flush()
+
+
+@contextmanager
+def progress_bar(what: str) -> "Iterator[Callable[[int, int], None]]":
+    """A progress bar with time left on a terminal; elsewhere nothing."""
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    console = _console()
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(what, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def detection_progress() -> "Iterator[Progress]":
+    """A progress bar for looking at images, which names each image that cannot be used, and why."""
+    with progress_bar("Finding corners") as advance:
+
+        def update(done: int, total: int, view: "View") -> None:
+            advance(done, total)
+            if view.status != "used":
+                reason = view.problems[-1].message if view.problems else view.detection.reason
+                say(f"{view.image}: {view.status}: {reason}")
+
+        yield update
+
+
+def _console() -> "Console":
+    from rich.console import Console
+
+    return Console(stderr=True, highlight=False, markup=False, soft_wrap=True)

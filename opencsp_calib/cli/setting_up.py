@@ -1,0 +1,128 @@
+"""The commands around calibrating: board, demo, plugins, and the versions."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from opencsp_calib.cli import arguments as args
+from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table
+
+if TYPE_CHECKING:
+    from opencsp_calib.calibration import Calibration
+    from opencsp_calib.camera import Camera
+    from opencsp_calib.compare import Difference
+
+KINDS = ("boards", "detectors", "solvers", "camera_formats", "image_sources")
+
+
+def board(
+    spec: Annotated[str, typer.Argument(metavar="SPEC", help="Such as checkerboard:18x23:50mm.")],
+    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE", help="board.svg, board.pdf or board.png.")],
+) -> None:
+    """Draw a board to print at true size."""
+    from opencsp_calib.drawing import write_board
+    from opencsp_calib.registry import installed
+
+    target = args.board_from(spec)
+    write_board(target, installed().boards[target.kind].draw(target), output)
+    say(f"board saved: {output}; print it at 100 %, and measure its scale bar")
+
+
+def plugins(json: args.Json = False) -> None:
+    """List what the installed plugins provide, and what is missing where one cannot run."""
+    from opencsp_calib.registry import installed
+
+    registry = installed()
+    rows, listed = [], []
+    for kind in KINDS:
+        for name, provided in sorted(getattr(registry, kind).items()):
+            what = kind.rstrip("s").replace("_", " ")
+            origin = registry.origins[kind, name]
+            rows.append((what, name, origin, provided.missing() or "ready"))
+            listed.append({"kind": what, "name": name, "plugin": origin, "missing": provided.missing()})
+    say_table(("kind", "name", "plugin", "state"), rows)
+    if json:
+        print_json(listed)
+
+
+def demo(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to put it.")] = Path("demo"),
+    views: Annotated[int, typer.Option(min=3, help="How many photographs.")] = 50,
+    jobs: args.Jobs = None,
+    json: args.Json = False,
+) -> None:
+    """Render photographs of a board as the procedure asks for, calibrate, and say how far that is from the truth."""
+    import time
+
+    from opencsp_calib import pipeline
+    from opencsp_calib.compare import compare
+    from opencsp_calib.demo import make_demo
+    from opencsp_calib.hdf5_calibration import save_calibration
+    from opencsp_calib.quality import judge
+    from opencsp_calib.report import write_report
+
+    started = time.perf_counter()
+    with detection_progress("Rendering photographs") as progress:
+        world = make_demo(
+            folder,
+            views,
+            jobs=jobs or pipeline.usable_cores(),
+            progress=lambda done, total: progress(done, total, None),
+        )
+    rendered = time.perf_counter()
+    with detection_progress() as progress:
+        calibration = pipeline.calibrate(world.images, world.board, name="demo", jobs=jobs, progress=progress)
+    solved = time.perf_counter()
+    save_calibration(calibration, folder / "camera.h5")
+    write_report(calibration, folder / "report.html")
+    difference = compare(calibration.camera, world.camera)
+    _say_demo(calibration, world.camera, difference)
+    say_problems(judge(calibration))
+    say(
+        f"camera and report saved in {folder}; rendered in {rendered - started:.1f} s, calibrated in {solved - rendered:.1f} s"
+    )
+    if json:
+        from opencsp_calib.summary import camera_as_json
+
+        print_json(
+            {
+                "truth": camera_as_json(world.camera),
+                "camera": camera_as_json(calibration.camera, calibration.sigma),
+                "rms_px": calibration.rms_px,
+                "difference": {"rms_px": difference.rms_px, "worst_px": difference.worst_px},
+                "seconds": {"render": rendered - started, "calibrate": solved - rendered},
+                "output": str(folder / "camera.h5"),
+            }
+        )
+
+
+COMMANDS = (board, demo, plugins)
+
+
+def print_versions() -> None:
+    """Ours, Python's, and those of the engines, for bug reports."""
+    import platform
+    from importlib.metadata import version
+
+    from opencsp_calib.registry import installed
+
+    typer.echo(f"opencsp-calib {version('opencsp-calib')}, Python {platform.python_version()}, {platform.platform()}")
+    for name, solver in sorted(installed().solvers.items()):
+        typer.echo(f"solver {name}: {solver.missing() or solver.version()}")
+
+
+def _say_demo(calibration: "Calibration", truth: "Camera", difference: "Difference") -> None:
+    """How far the result is from the truth."""
+    import numpy as np
+
+    names, errors = truth.lens.parameter_names, calibration.camera.params - truth.params
+    rows = [
+        (name, f"{true:.6g}", f"{found:.6g}", f"{error:+.2g}", f"{sigma:.2g}")
+        for name, true, found, error, sigma in zip(
+            names, truth.params, calibration.camera.params, errors, np.asarray(calibration.sigma), strict=True
+        )
+    ]
+    say_table(("parameter", "truth", "found", "error", "±1 sigma"), rows)
+    say(f"rms {calibration.rms_px:.4f} px; over the image the camera is {difference.rms_px:.4f} px rms from the truth,")
+    say(f"{difference.worst_px:.4f} px at worst (frames aligned)")

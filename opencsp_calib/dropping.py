@@ -1,0 +1,76 @@
+"""Leaving bad images out: by name, the worst few, or all above an rms; then solving again."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.detection import Observations, Problem
+from opencsp_calib.errors import InputError
+
+__all__ = ["MIN_LEFT", "drop_above", "drop_worst", "excluding"]
+
+MIN_LEFT = 3  # a calibration cannot do with fewer views
+
+Solve = Callable[[Observations], Calibration]
+
+
+def excluding(observations: Observations, names: Iterable[str]) -> Observations:
+    """Without the named images.
+
+    Raises
+    ------
+    InputError
+        If there is no image of that name.
+    """
+    names = list(names)
+    known = {view.image for view in observations.views}
+    for name in names:
+        if name not in known:
+            raise InputError(f"there is no image {name!r} to exclude; there are {', '.join(sorted(known)[:8])} ...")
+    return observations.dropping(names, Problem("excluded", "left out because you said so"))
+
+
+def drop_worst(calibration: Calibration, count: int, solve: Solve) -> Calibration:
+    """Without the views of the largest rms, solved again.
+
+    Raises
+    ------
+    InputError
+        If fewer than `MIN_LEFT` views would be left.
+    """
+    used = calibration.observations.used
+    if count < 0 or len(used) - count < MIN_LEFT:
+        raise InputError(f"cannot drop {count} of {len(used)} views: at least {MIN_LEFT} must be left")
+    worst = np.argsort(-calibration.view_rms_px)[:count]
+    return _without(calibration, [used[index].image for index in worst], solve)
+
+
+def drop_above(calibration: Calibration, limit_px: float, solve: Solve) -> Calibration:
+    """Without the views whose rms is above a limit, solved again, until none is.
+
+    Raises
+    ------
+    InputError
+        If fewer than `MIN_LEFT` views would be left.
+    """
+    while True:
+        used = calibration.observations.used
+        above = [view.image for view, rms in zip(used, calibration.view_rms_px, strict=True) if rms > limit_px]
+        if not above:
+            return calibration
+        if len(used) - len(above) < MIN_LEFT:
+            raise InputError(
+                f"{len(above)} of {len(used)} views have an rms above {limit_px:g} px; at least {MIN_LEFT} must "
+                "be left: take better photographs, or raise the limit"
+            )
+        calibration = _without(calibration, above, solve)
+
+
+def _without(calibration: Calibration, names: list[str], solve: Solve) -> Calibration:
+    rms = {v.image: r for v, r in zip(calibration.observations.used, calibration.view_rms_px, strict=True)}
+    observations = calibration.observations
+    for name in names:
+        problem = Problem("dropped", f"left out: its rms was {rms[name]:.3f} px before")
+        observations = observations.dropping([name], problem)
+    return solve(observations)

@@ -1,0 +1,229 @@
+"""From photographs to a calibration: the only place where the parts are put together."""
+
+import os
+import platform
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from datetime import datetime, timezone
+from importlib.metadata import version
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from opencsp_calib import board_shape as shapes
+from opencsp_calib.board import Board
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.camera import Camera
+from opencsp_calib.detecting import Progress, Refine, Stop, look_at
+from opencsp_calib.detection import Observations
+from opencsp_calib.errors import InputError
+from opencsp_calib.images import find_images
+from opencsp_calib.interfaces import Solver
+from opencsp_calib.models import lens_model
+from opencsp_calib.options import BoardShape, SolveOptions, Weights
+from opencsp_calib.registry import installed
+from opencsp_calib.uncertainty import with_uncertainty
+
+__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "calibrate", "detect", "solve"]
+
+DEFAULT_MODEL = "opencv4"
+DEFAULT_SOLVER = "bundle"
+MIN_VIEWS = 3
+
+Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+PixelAspect: TypeAlias = Literal["free", "square"] | float
+
+
+def detect(
+    images: Images,
+    board: Board,
+    *,
+    detector: str | None = None,
+    refine: Refine | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+) -> Observations:
+    """Find a board in photographs.
+
+    Parameters
+    ----------
+    images : path, or several
+        Files, folders or glob patterns.
+    board : Board
+    detector : str, optional
+        Its name; by default the one for this kind of board.
+    refine : 'none', 'subpix' or 'model', optional
+        How corners are located once found: as the detector gives them, by OpenCV's sub-pixel search, or by fitting
+        the image of a corner. By default 'model' for corners of a checkerboard.
+    jobs : int, optional
+        Images looked at at the same time; by default one a core.
+    progress : callable, optional
+        Called with the number of images done, their total, and the last view.
+    stop : threading.Event, optional
+        Set it to stop.
+
+    Returns
+    -------
+    Observations
+        Of all images, with what became of each; one bad image does not stop the others.
+
+    Raises
+    ------
+    InputError
+        If there are no images, none can be read, or the detector cannot run.
+    CancelledError
+        If it was stopped.
+    """
+    registry = installed()
+    files = find_images(images)
+    finder = registry.detector(detector) if detector else registry.detector_for(board)
+    if not finder.supports(board):
+        raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}")
+    return look_at(files, board, finder, refine, jobs or usable_cores(), progress, stop)
+
+
+def solve(
+    observations: Observations,
+    model: str = DEFAULT_MODEL,
+    solver: str = DEFAULT_SOLVER,
+    *,
+    board_shape: BoardShape | Literal["auto"] = "auto",
+    pixel_aspect: PixelAspect | None = None,
+    weights: Weights | None = None,
+    robust: bool | None = None,
+    guess: Camera | None = None,
+    name: str = "camera",
+    record: Mapping[str, str] | None = None,
+    provenance: Mapping[str, Any] | None = None,
+) -> Calibration:
+    """Solve for the camera, with honest uncertainty.
+
+    Parameters
+    ----------
+    observations : Observations
+    model : str
+        The lens model.
+    solver : str
+    board_shape : 'auto', 'flat', 'warp' or 'free'
+        Whether the board is taken as it is given, gets a smooth warp, or has every corner's position solved for;
+        'auto' decides from the data and says so, where the solver is able to solve for the shape.
+    pixel_aspect : 'free', 'square' or float, optional
+        Whether fx and fy are independent, equal, or in the ratio fy/fx. By default free, but square where the board's
+        shape is free and all views hold it the same way up, because then the two cannot be told apart.
+    weights : 'equal' or 'covariance', optional
+    robust : bool, optional
+        These two by default as carefully as the solver is able to: by covariance and robust where it has both
+        abilities, else equal and not robust.
+    guess : Camera, optional
+        Where to start.
+    name : str
+        Of the camera.
+    record, provenance : mapping, optional
+        To be kept with the calibration.
+
+    Returns
+    -------
+    Calibration
+
+    Raises
+    ------
+    InputError
+        If there are too few views, or the solver is not able to do what is asked.
+    CalibrationFailedError
+        If no result can be trusted.
+    """
+    engine = installed().solver(solver)
+    _check_views(observations)
+    careful = {"weights", "robust"} <= engine.abilities
+    options = SolveOptions(
+        guess=guess,
+        board_shape="flat" if board_shape == "auto" else board_shape,
+        pixel_aspect=_held_aspect(pixel_aspect),
+        weights=weights or ("covariance" if careful else "equal"),
+        robust=careful if robust is None else robust,
+    )
+    check_abilities(engine, model, options)
+
+    def run(views: Observations, chosen: SolveOptions) -> Calibration:
+        return engine.solve(views, model, chosen)
+
+    if board_shape == "auto" and "board_free" in engine.abilities:
+        solved = shapes.decide(observations, options, run, aspect_given=pixel_aspect is not None)
+    else:
+        solved = shapes.solve_with_aspect(observations, options, run, aspect_given=pixel_aspect is not None)
+    solved = with_uncertainty(solved)
+    return replace(
+        solved,
+        camera=replace(solved.camera, name=name),
+        record=record or {},
+        provenance={**_versions(), **(provenance or {})},
+    )
+
+
+def calibrate(
+    images: Images, board: Board, model: str = DEFAULT_MODEL, solver: str = DEFAULT_SOLVER, **options: Any
+) -> Calibration:
+    """Photographs to a calibration: `detect`, then `solve`, whose options it takes by name."""
+    of_detect = {key: options.pop(key) for key in ("detector", "refine", "jobs", "progress", "stop") if key in options}
+    return solve(detect(images, board, **of_detect), model, solver, **options)
+
+
+def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
+    """Refuse what a solver is not able to do, naming those that are.
+
+    Raises
+    ------
+    InputError
+    """
+    lens_model(model)  # an unknown one is refused first
+    able = [s for _, s in sorted(installed().solvers.items()) if s.missing() is None]
+    if model not in engine.models:
+        others = ", ".join(s.name for s in able if model in s.models) or "none that is installed"
+        raise InputError(f"the solver {engine.name!r} has no lens model {model!r}; solvers that have it: {others}")
+    lacking = options.asked - engine.abilities
+    if lacking:
+        others = ", ".join(s.name for s in able if options.asked <= s.abilities and model in s.models)
+        what = ", ".join(sorted(lacking))
+        raise InputError(
+            f"the solver {engine.name!r} is not able to do what is asked ({what}); "
+            f"solvers that are: {others or 'none that is installed'}"
+        )
+
+
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)  # not on Windows and macOS
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+def _check_views(observations: Observations) -> None:
+    used, looked_at = len(observations.used), len(observations.views)
+    if used == 0:
+        reasons = [view.detection.reason for view in observations.views if view.detection.reason]
+        why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
+        raise InputError(f"no board to calibrate from in any of the {looked_at} images: {why}")
+    if used < MIN_VIEWS:
+        raise InputError(
+            f"the board is found in only {used} of {looked_at} images; a calibration needs at least {MIN_VIEWS} views, "
+            "better about 50"
+        )
+    # the same pose again adds no information: a solver would fail, or worse, not fail
+    if all(np.array_equal(d.pixels, observations.detections[0].pixels) for d in observations.detections[1:]):
+        raise InputError("all views show the board in the very same place; take views from different directions")
+
+
+def _held_aspect(pixel_aspect: PixelAspect | None) -> float | None:
+    if pixel_aspect is None or pixel_aspect == "free":
+        return None
+    return 1.0 if pixel_aspect == "square" else float(pixel_aspect)
+
+
+def _versions() -> dict[str, Any]:
+    return {
+        "opencsp-calib": version("opencsp-calib"),
+        "python": platform.python_version(),
+        "numpy": version("numpy"),
+        "platform": platform.platform(),
+        "time": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+    }
