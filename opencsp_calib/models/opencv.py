@@ -11,6 +11,8 @@ With x = X/Z, y = Y/Z and r2 = x² + y²::
 Source: OpenCV documentation, module calib3d, "Detailed Description".
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Params, Points
@@ -38,12 +40,8 @@ class OpenCVModel(LensModel):
 
     def valid_radius(self, distortion: Params) -> float:
         """See `LensModel.valid_radius`; the tangential, prism and tilt terms, which are small, are left out."""
-        k1, k2, _, _, k3, k4, k5, k6 = _padded(distortion)[:8]
-        numerator = np.polynomial.Polynomial([1.0, k1, k2, k3])  # in s = r²
-        denominator = np.polynomial.Polynomial([1.0, k4, k5, k6])
-        twice_s = np.polynomial.Polynomial([0.0, 2.0])
-        slope = (numerator + twice_s * numerator.deriv()) * denominator - twice_s * numerator * denominator.deriv()
-        return float(np.sqrt(smallest_positive_root(slope.coef, denominator.coef)))
+        k1, k2, _, _, k3, k4, k5, k6 = _padded(distortion)[:8].tolist()
+        return _fold((1.0, k1, k2, k3), (1.0, k4, k5, k6))
 
     def max_angle(self, distortion: Params) -> float:
         """See `LensModel.max_angle`; always below a right angle."""
@@ -85,6 +83,15 @@ class OpenCVModel(LensModel):
             plane = np.asarray(points[:, :2] / np.where(z > 0, z, np.nan)[:, None], dtype=np.float64)
             plane[~(np.hypot(plane[:, 0], plane[:, 1]) <= self.valid_radius(distortion))] = np.nan
         return plane
+
+
+@lru_cache(maxsize=1024)  # roots take longer than projecting a view, and every projection asks
+def _fold(numerator: tuple[float, ...], denominator: tuple[float, ...]) -> float:
+    """The radius where r numerator(r²) / denominator(r²) stops growing, or has a pole; coefficients from r⁰ up."""
+    top, bottom = np.polynomial.Polynomial(numerator), np.polynomial.Polynomial(denominator)
+    twice_s = np.polynomial.Polynomial([0.0, 2.0])  # s = r²
+    slope = (top + twice_s * top.deriv()) * bottom - twice_s * top * bottom.deriv()
+    return float(np.sqrt(smallest_positive_root(slope.coef, bottom.coef)))
 
 
 def _padded(distortion: Params) -> Params:
