@@ -93,12 +93,15 @@ class Drawing:
         In order of drawing.
     origin_m : (float, float)
         Where on the drawing the corner with id 0 is.
+    dark : bool
+        The page, and so its margin, is black: for boards printed white on black.
     """
 
     width_m: float
     height_m: float
     rectangles: tuple[Rectangle, ...]
     origin_m: tuple[float, float]
+    dark: bool = False
 
 
 @runtime_checkable
