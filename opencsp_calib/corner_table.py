@@ -1,0 +1,95 @@
+"""All corners of all used views in one table, with their weights: what a calibration is solved from."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats, Ids, Mask, Pixels
+from opencsp_calib.detection import Detection
+from opencsp_calib.options import Weights
+
+__all__ = ["CornerTable"]
+
+CHUNK = 4096  # corners linearised at once: their Jacobians stay in the processor's cache
+
+
+@dataclass(frozen=True, eq=False)
+class CornerTable:
+    """Every corner seen in the used views, view after view.
+
+    Parameters
+    ----------
+    ids : (N,) int
+    pixels : (N, 2) px
+    first : (V + 1,) int
+        Corners ``first[v]`` to ``first[v + 1]`` are of view v.
+    whitening : (N, 2, 2), optional
+        What residuals are multiplied by before they are squared: W with WᵀW the inverse of the corner's covariance;
+        None for the identity.
+    """
+
+    ids: Ids
+    pixels: Pixels
+    first: Ids
+    whitening: Floats | None = None
+
+    @classmethod
+    def of(cls, detections: Sequence[Detection], weights: Weights = "equal") -> "CornerTable":
+        """The corners of detections, weighted ``equal`` or by their ``covariance`` where they have one."""
+        counts = [len(detection) for detection in detections]
+        return cls(
+            np.concatenate([d.ids for d in detections]) if detections else np.empty(0, dtype=np.int64),
+            np.concatenate([d.pixels for d in detections]) if detections else np.empty((0, 2)),
+            np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
+            _whitening(detections) if weights == "covariance" else None,
+        )
+
+    def __len__(self) -> int:
+        return len(self.ids)
+
+    @property
+    def counts(self) -> Ids:
+        """(V,) corners of each view."""
+        return np.diff(self.first)
+
+    @property
+    def view(self) -> Ids:
+        """(N,) the view of each corner."""
+        return np.repeat(np.arange(len(self.first) - 1), self.counts)
+
+    def keeping(self, mask: Mask) -> "CornerTable":
+        """Only the corners where the mask (N,) is true; a view may be left with none."""
+        first = np.concatenate([[0], np.cumsum(mask)])[self.first].astype(np.int64)
+        whitening = None if self.whitening is None else self.whitening[mask]
+        return CornerTable(self.ids[mask], self.pixels[mask], first, whitening)
+
+    def weighted(self, factor: Floats) -> "CornerTable":
+        """The same with each corner's whitened residual multiplied by a factor (N,)."""
+        whitening = np.eye(2) if self.whitening is None else self.whitening
+        return replace(self, whitening=factor[:, None, None] * whitening)
+
+    def split(self, mask: Mask) -> tuple[Mask, ...]:
+        """A mask (N,) as one of each view."""
+        return tuple(np.split(mask, self.first[1:-1]))
+
+    def chunks(self) -> Iterator[tuple[int, int]]:
+        """First view and end of runs of views with about `CHUNK` corners, or one view where that has more."""
+        begin, views = 0, len(self.first) - 1
+        while begin < views:
+            end = max(begin + 1, int(np.searchsorted(self.first, self.first[begin] + CHUNK, side="right")) - 1)
+            yield begin, end
+            begin = end
+
+
+def _whitening(detections: Sequence[Detection]) -> Floats:
+    """(N, 2, 2): by covariance; a corner without a usable one counts as the typical one of the others."""
+    covariances = np.concatenate(
+        [np.full((len(d), 2, 2), np.nan) if d.covariance is None else d.covariance for d in detections]
+    )
+    with np.errstate(invalid="ignore"):
+        determinant = covariances[:, 0, 0] * covariances[:, 1, 1] - covariances[:, 0, 1] * covariances[:, 1, 0]
+        usable = (determinant > 0) & (covariances[:, 0, 0] > 0)
+    typical = np.median(covariances[usable][:, [0, 1], [0, 1]]) if usable.any() else 1.0
+    covariances[~usable] = typical * np.eye(2)
+    return np.linalg.inv(np.linalg.cholesky(covariances))
