@@ -23,7 +23,16 @@ from opencsp_calib.image import Image
 if TYPE_CHECKING:
     from opencsp_calib.camera import Camera
 
-__all__ = ["EXTENSIONS", "ImageFile", "find_images", "opencv_on_one_thread", "read_image", "undistort", "write_image"]
+__all__ = [
+    "EXTENSIONS",
+    "ImageFile",
+    "encode_thumbnail",
+    "find_images",
+    "opencv_on_one_thread",
+    "read_image",
+    "undistort",
+    "write_image",
+]
 
 EXTENSIONS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".pnm", ".ppm", ".webp")
 MAX_BYTES = 2**31
@@ -156,6 +165,16 @@ def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:
         raise InputError(f"cannot write {path}: not an image of 8 or 16 bits")
     with replacing(path) as temporary:
         temporary.write_bytes(data.tobytes())
+
+
+def encode_thumbnail(pixels: NDArray[Any], side: int) -> bytes:
+    """A small JPEG of grey levels, at most `side` pixels either way, 16 bits brought to 8."""
+    cv2 = _opencv()
+    scale = min(1.0, side / max(pixels.shape[:2]))
+    small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else pixels
+    if small.dtype == np.uint16:
+        small = (small / (max(int(small.max()), 1) / 255.0)).astype(np.uint8)
+    return bytes(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes())
 
 
 def undistort(image: NDArray[Any], camera: "Camera", target: "Camera | None" = None) -> NDArray[Any]:

@@ -7,7 +7,8 @@ from typing import Any
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations, Problem, View
-from opencsp_calib.quality import ViewQuality, judge, view_qualities
+from opencsp_calib.judgement import judge
+from opencsp_calib.quality import ViewQuality, view_qualities
 
 __all__ = [
     "PIXEL_PITCH",

@@ -230,7 +230,7 @@ def _finish(
 ) -> None:
     """Save, report, and tell."""
     from opencsp_calib.hdf5_calibration import save_calibration
-    from opencsp_calib.quality import judge
+    from opencsp_calib.judgement import judge
     from opencsp_calib.report import write_report
     from opencsp_calib.summary import calibration_as_json
 

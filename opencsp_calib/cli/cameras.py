@@ -49,7 +49,7 @@ def show(
         say(f"{key}: {value}")
     say_problems(imported.notes)
     if calibration:
-        from opencsp_calib.quality import judge
+        from opencsp_calib.judgement import judge
 
         views = len(calibration.observations.used)
         say(f"calibrated by {calibration.solver} from {views} views, rms {calibration.rms_px:.4f} px")

@@ -59,7 +59,7 @@ def demo(
     from opencsp_calib.compare import compare
     from opencsp_calib.demo import make_demo
     from opencsp_calib.hdf5_calibration import save_calibration
-    from opencsp_calib.quality import judge
+    from opencsp_calib.judgement import judge
     from opencsp_calib.report import write_report
 
     started = time.perf_counter()

@@ -1,0 +1,6 @@
+"""The report: one HTML file that works offline, prints well, and says first whether to trust the result."""
+
+from opencsp_calib.report.page import write_report
+from opencsp_calib.report.plots import plot_difference
+
+__all__ = ["plot_difference", "write_report"]

@@ -1,0 +1,72 @@
+"""Making figures with matplotlib, without its global state, and putting them into a page."""
+
+import base64
+import io
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from opencsp_calib.atomic import replacing
+from opencsp_calib.errors import InputError
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+__all__ = ["ACCENT", "COLOURS", "as_image", "image_axes", "new_figure", "save_figure"]
+
+ACCENT = "#0b6e99"
+COLOURS = "viridis"
+STYLE: dict[str, Any] = {
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.titlesize": 10,
+    "svg.fonttype": "none",
+}
+
+
+def new_figure(width: float, height: float, columns: int = 1) -> "tuple[Figure, list[Axes]]":
+    """A figure of so many inches, with axes side by side."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        return figure, [figure.add_subplot(1, columns, index + 1) for index in range(columns)]
+
+
+def image_axes(axes: "Axes", image_size: tuple[int, int], title: str = "") -> None:
+    """Axes that are the image: y down, pixels square, from pixel edge to pixel edge."""
+    width, height = image_size
+    axes.set(xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5), aspect="equal", title=title)
+    axes.set_xlabel("x (px)")
+    axes.set_ylabel("y (px)")
+
+
+def as_image(figure: "Figure", alternative: str) -> str:
+    """The figure as an ``img`` element, drawn as vectors."""
+    import html
+
+    import matplotlib as mpl
+
+    buffer = io.BytesIO()
+    with mpl.rc_context(STYLE):
+        figure.savefig(buffer, format="svg", dpi=130, metadata={"Date": None})
+    data = base64.b64encode(buffer.getvalue()).decode()
+    return f'<img class="plot" alt="{html.escape(alternative)}" src="data:image/svg+xml;base64,{data}">'
+
+
+def save_figure(figure: "Figure", path: str | PathLike[str]) -> None:
+    """Write a figure as PNG, SVG or PDF, by the extension.
+
+    Raises
+    ------
+    InputError
+        If it is another extension, or cannot be written.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in (".png", ".svg", ".pdf"):
+        raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {suffix or 'a file without extension'!r}")
+    with replacing(path) as temporary:
+        figure.savefig(temporary, format=suffix[1:], dpi=150)

@@ -1,0 +1,108 @@
+"""Who may import whom, what importing costs, and which names are public: design rules that only a test keeps."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import opencsp_calib
+
+CORE = Path(opencsp_calib.__file__).parent
+PLUGINS = CORE.parent / "plugins"
+
+TIERS = (
+    "errors",
+    "arrays atomic",
+    "models",
+    "camera pose board",
+    "image detection options",
+    "calibration",
+    "images pose_fit unknowns schur normal_equations subpix",
+    "corner_kernel corner_table corners quality photograph compare uncertainty hdf5 hdf5_calibration opencsp",
+    "drawing board_file synthetic rendering resampling lens_fit board_shape dropping initial judgement",
+    "summary",
+    "interfaces",
+    "solving importing hookspecs",
+    "registry",
+    "detecting conformance",
+    "pipeline demo",
+    "validate check coach fleet",
+    "report",
+    "cli gui",
+)
+RANK = {module: rank for rank, tier in enumerate(TIERS) for module in tier.split()}
+ONE_LINERS = {"camera"}  # Camera.load, save, undistort ... import inside, the only exception
+
+
+def modules(folder: Path) -> list[Path]:
+    return sorted(folder.rglob("*.py"))
+
+
+def imported(path: Path) -> set[str]:
+    """The modules that a file imports anywhere, as dotted names."""
+    names = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return names
+
+
+def own_module(path: Path) -> str:
+    return path.relative_to(CORE).parts[0].removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", modules(CORE), ids=lambda p: str(p.relative_to(CORE)))
+def test_core_imports_only_what_comes_before(path: Path) -> None:
+    module = own_module(path)
+    if module == "__init__":
+        return
+    assert module in RANK, f"{module} is not in the order of imports: add it to the design and here"
+    for name in imported(path):
+        assert not name.startswith("opencsp_calib_"), f"the core must not know the plugin {name}"
+        parts = name.split(".")
+        if parts[0] == "opencsp_calib" and len(parts) > 1 and parts[1] in RANK and parts[1] != module:
+            assert RANK[parts[1]] <= RANK[module] or module in ONE_LINERS, f"{module} must not import {parts[1]}"
+
+
+@pytest.mark.parametrize("path", modules(PLUGINS), ids=lambda p: str(p.relative_to(PLUGINS)))
+def test_a_plugin_imports_the_core_and_never_another_plugin(path: Path) -> None:
+    own = path.relative_to(PLUGINS).parts[0]
+    for name in imported(path):
+        top = name.split(".")[0]
+        assert not top.startswith("opencsp_calib_") or top == own, f"{own} must not import {top}"
+
+
+def loaded_by(statement: str) -> set[str]:
+    code = f"import sys\n{statement}\nprint(*sorted({{m.split('.')[0] for m in sys.modules}}))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return set(result.stdout.split()[-400:]) | set(result.stdout.split())
+
+
+HEAVY = {"cv2", "matplotlib", "nicegui", "fastapi", "pycolmap", "mrcal", "numba", "pypylon", "distributed", "h5py"}
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "import opencsp_calib",
+        "from opencsp_calib.cli import run; run(['--help'])",
+        "from opencsp_calib.registry import installed; installed()",
+    ],
+)
+def test_nothing_heavy_is_loaded_before_it_is_used(statement: str) -> None:
+    assert not loaded_by(statement) & HEAVY
+
+
+def test_public_names_are_sorted_and_exist() -> None:
+    assert opencsp_calib.__all__ == sorted(opencsp_calib.__all__)
+    for name in opencsp_calib.__all__:
+        assert getattr(opencsp_calib, name) is not None
+
+
+@pytest.mark.parametrize("path", [*modules(CORE), *modules(PLUGINS)], ids=lambda p: p.name)
+def test_a_file_stays_within_300_lines(path: Path) -> None:
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= 300
