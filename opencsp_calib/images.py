@@ -98,7 +98,8 @@ def _expanded(text: str) -> list[Path]:
 
 def _natural(path: Path) -> list[tuple[int, str]]:
     """Sorts image2 before image10."""
-    return [(int(part), "") if part.isdecimal() else (-1, part.lower()) for part in re.split(r"([0-9]+)", path.name)]
+    parts = re.split(r"([0-9]+)", path.as_posix())
+    return [(int(part), "") if part.isdecimal() else (-1, part.lower()) for part in parts]
 
 
 def read_image(file: ImageFile) -> Image:

@@ -75,7 +75,8 @@ def compare(
     where = "at infinity" if range_m is None else f"at {range_m:g} m"
     say(
         f"{where}: rms {difference.rms_px:.4g} px, median {difference.median_px:.4g} px, "
-        f"worst {difference.worst_px:.4g} px over the image, after a turn of the frame by {difference.rotation_deg:.4g} degrees"
+        f"worst {difference.worst_px:.4g} px over the image, "
+        f"after a turn of the frame by {difference.rotation_deg:.4g} degrees"
     )
     if plot:
         from opencsp_calib.report import plot_difference

@@ -79,9 +79,8 @@ def demo(
     difference = compare(calibration.camera, world.camera)
     _say_demo(calibration, world.camera, difference)
     say_problems(judge(calibration))
-    say(
-        f"camera and report saved in {folder}; rendered in {rendered - started:.1f} s, calibrated in {solved - rendered:.1f} s"
-    )
+    say(f"rendered in {rendered - started:.1f} s, calibrated in {solved - rendered:.1f} s")
+    say(f"camera and report saved in {folder}")
     if json:
         from opencsp_calib.summary import camera_as_json
 

@@ -125,8 +125,8 @@ def _parameters(calibration: Calibration) -> str:
             if notes
             else ""
         )
-        + '<p class="quiet">The centre of the upper-left pixel is (0, 0). Correlated parameters (cx with p2, cy with p1, '
-        "the focal length with the range) can hardly be told apart one by one; together they are well known.</p>"
+        + '<p class="quiet">The centre of the upper-left pixel is (0, 0). Correlated parameters (cx with p2, cy with '
+        "p1, the focal length with the range) can hardly be told apart one by one; together they are well known.</p>"
         f"</div><div>{plot}</div></div>"
     )
 
@@ -188,5 +188,6 @@ def _provenance(calibration: Calibration) -> str:
     return (
         "<h2>Provenance</h2>"
         + table(("", ""), rows)
-        + f"<details><summary>Images and their SHA-256</summary><pre>{escape(json.dumps(hashes, indent=1))}</pre></details>"
+        + "<details><summary>Images and their SHA-256</summary>"
+        + f"<pre>{escape(json.dumps(hashes, indent=1))}</pre></details>"
     )

@@ -67,7 +67,8 @@ def _figure(view: View, thumbnail: str, calibration: Calibration, residuals: Flo
     return (
         f'<figure class="view" id="{_anchor(view.image)}">'
         f'<svg viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="{escape(view.image, quote=True)}">'
-        f'<rect class="empty" x="-0.5" y="-0.5" width="{width}" height="{height}"/>{picture}{corners}{rejected}{arrows}</svg>'
+        f'<rect class="empty" x="-0.5" y="-0.5" width="{width}" height="{height}"/>'
+        f"{picture}{corners}{rejected}{arrows}</svg>"
         f"<figcaption><b>{escape(view.image)}</b>: {view.status}, {len(view.detection)} corners{rms}"
         f"{'<br>' + problems if problems else ''}</figcaption></figure>"
     )
