@@ -164,6 +164,10 @@ class RecordedBoard(Board):
 
     recorded_spec: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "kind", self.recorded_spec.partition(":")[0])
+        super().__post_init__()
+
     @property
     def spec(self) -> str:
         """See `Board.spec`."""
@@ -187,7 +191,7 @@ def parse_length(text: str) -> float:
         raise BoardSpecError(f"the length {text.strip()!r} {said}; write it with mm, cm, m or in, like 50mm")
     length = float(number) * UNITS_M[unit]
     if not 0 < length < 1e4:
-        raise BoardSpecError(f"{text!r} is not a usable length")
+        raise BoardSpecError(f"{text!r} is not a usable length; write it like 50mm")
     return length
 
 

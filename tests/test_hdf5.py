@@ -1,5 +1,6 @@
 """The camera file: read by OpenCSP's own way of loading, the oddities in the field, and damage of every kind."""
 
+import contextlib
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -269,10 +270,8 @@ def test_damage_gives_an_error_or_the_same_camera(data: st.DataObject, tmp_path:
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     cut = data.draw(st.one_of(st.none(), st.integers(0, len(content))))
     path.write_bytes(bytes(content[:cut]))
-    try:
+    with contextlib.suppress(CalibError):
         assert Camera.load(path) == camera
-    except CalibError:
-        pass
 
 
 def test_nothing_is_left_when_writing_fails(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
