@@ -1,0 +1,147 @@
+"""The same calibration from other views: halves, folds, leaving one out. What changes is what cannot be trusted.
+
+Everything here takes `solve` as an argument: any function of observations that returns a calibration.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.compare import Difference, compare
+from opencsp_calib.detection import Observations
+from opencsp_calib.errors import InputError
+from opencsp_calib.pose_fit import pose_residuals
+
+__all__ = ["HalvesDifference", "HeldOut", "Solve", "compare_halves", "folds", "halves", "held_out", "leaving_each_out"]
+
+Solve: TypeAlias = Callable[[Observations], Calibration]
+
+
+@dataclass(frozen=True, eq=False)
+class HalvesDifference:
+    """Two calibrations from views that have nothing in common but camera and board.
+
+    Parameters
+    ----------
+    first, second : Calibration
+        From the odd and from the even views: 1st, 3rd, 5th.. and 2nd, 4th, 6th..
+    difference : Difference
+        Of their cameras.
+    """
+
+    first: Calibration = field(repr=False)
+    second: Calibration = field(repr=False)
+    difference: Difference
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """How well calibrations explain views they have not seen, nothing but the views' poses being fitted.
+
+    It tells a wrong board from a right one, and shows a model too rich for its data; it is nearly blind to wrong
+    intrinsics, because each view's pose is fitted to them.
+
+    Parameters
+    ----------
+    rms_px : float
+        Over all held-out corners.
+    images : tuple of str
+        The views held out.
+    view_rms_px : (V,)
+        Of each of them.
+    """
+
+    rms_px: float
+    images: tuple[str, ...] = field(repr=False)
+    view_rms_px: Floats = field(repr=False)
+
+
+def halves(observations: Observations) -> tuple[Observations, Observations]:
+    """The odd views and the even ones, counted among those used and from one: neighbours in time are parted.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than four used views.
+    """
+    images = [view.image for view in observations.used]
+    if len(images) < 4:
+        raise InputError(f"{len(images)} views cannot be parted into halves; take at least four")
+    return observations.keeping(images[::2]), observations.keeping(images[1::2])
+
+
+def folds(observations: Observations, count: int = 5) -> tuple[tuple[Observations, Observations], ...]:
+    """Pairs of views to solve from and views held out; every used view is held out once.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two folds, or fewer used views than folds.
+    """
+    images = [view.image for view in observations.used]
+    if not 2 <= count <= len(images):
+        raise InputError(f"{len(images)} views cannot be parted into {count} folds")
+    held = [set(images[k::count]) for k in range(count)]
+    return tuple((observations.keeping(set(images) - fold), observations.keeping(fold)) for fold in held)
+
+
+def leaving_each_out(observations: Observations) -> tuple[Observations, ...]:
+    """As many sets as there are used views, each without one of them."""
+    return tuple(observations.dropping([view.image]) for view in observations.used)
+
+
+def compare_halves(observations: Observations, solve: Solve, *, range_m: float | None = None) -> HalvesDifference:
+    """Solve the odd and the even views apart and compare the cameras by projection.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than four used views, or `solve` refuses a half.
+    CalibrationFailedError
+        If `solve` finds no result for a half.
+    """
+    first, second = (solve(half) for half in halves(observations))
+    return HalvesDifference(first, second, compare(first.camera, second.camera, range_m=range_m))
+
+
+def held_out(pairs: tuple[tuple[Observations, Observations], ...], solve: Solve) -> HeldOut:
+    """Solve from the first of each pair and explain the views of the second by it.
+
+    Parameters
+    ----------
+    pairs : tuple of (Observations, Observations)
+        Such as `folds` makes.
+    solve : callable
+        Its board as solved is used; where its shape was free, without the corners that too few views showed.
+
+    Raises
+    ------
+    InputError, CalibrationFailedError
+        As `solve` and `fit_pose`.
+    """
+    images, squares = [], []
+    for training, test in pairs:
+        calibration = solve(training)
+        solved = _solved_corners(calibration)
+        for view in test.used:
+            detection = view.detection.keeping(solved[view.detection.ids])
+            error = pose_residuals(calibration.camera, calibration.board, detection)
+            images.append(view.image)
+            squares.append((error**2).sum(axis=1))
+    rms = float(np.sqrt(np.concatenate(squares).mean()))
+    return HeldOut(rms, tuple(images), np.sqrt([s.mean() for s in squares]))
+
+
+def _solved_corners(calibration: Calibration) -> np.ndarray:
+    """(K,) bool: the corners whose place on the board is known: given, or solved for from two views at least."""
+    count = len(calibration.board.points)
+    if calibration.options.board_shape != "free":
+        return np.ones(count, dtype=bool)
+    seen = np.zeros(count, dtype=int)
+    for detection, outliers in zip(calibration.observations.detections, calibration.outliers, strict=True):
+        seen[detection.ids[~outliers]] += 1
+    return seen >= 2

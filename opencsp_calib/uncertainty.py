@@ -1,0 +1,189 @@
+"""How far to trust a calibration: of the parameters, of every projection, and by each view alone.
+
+Two estimates, for any solver's result, from the normal equations at its solution with poses and board marginalised:
+
+*residual*   the inverse information times the variance of the residuals: right if they are independent. They are not:
+             neighbouring corners share their errors, boards flex, and it is too small by up to 20 times on real sets.
+*jackknife*  how the camera moves when each view in turn is left out, ``(V - 1)/V sum (d - mean)(d - mean)'``: a view
+             may be wrong as a whole, in any way. It has about V - 1 degrees of freedom: 95 % of the truth lies within
+             Student's t of that many, times sigma (`student_factor`). In the literature of clustered errors this is
+             CV3 (Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023).
+
+The honest one, which is shown, saved and used in verdicts, is the larger of the two in every direction of parameter
+space: never below either, and never singular where the jackknife, having fewer views than parameters, is.
+
+A projection's uncertainty is what is left after the change of frame that `compare` fits is projected out.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.linalg import eigh
+from scipy.special import stdtrit
+
+from opencsp_calib.arrays import Floats, Matrix, Params
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.detection import Problem
+from opencsp_calib.normal_equations import normal_equations
+from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
+from opencsp_calib.schur import camera_covariance, camera_without_each_view
+
+__all__ = [
+    "Influence",
+    "influence",
+    "projection_sigma",
+    "ray_sigma",
+    "sigma_map",
+    "sigma_over_range",
+    "student_factor",
+    "with_uncertainty",
+]
+
+MIN_VIEWS = 3  # with two views, leaving one out leaves nothing to compare
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """How far one view alone moves the camera.
+
+    Parameters
+    ----------
+    image : str
+    rms_px : float
+        Of the view's residuals: it may be unremarkable where the influence is not.
+    params : (P,)
+        The camera's parameters with this view left out, minus those with it.
+    shift_rms_px, shift_worst_px : float
+        How far projections move over the image when it is left out, after aligning the frames.
+    share : float
+        Of the jackknife variance of projections over the image: 1/V each where all views count the same.
+    """
+
+    image: str
+    rms_px: float
+    params: Params = field(repr=False)
+    shift_rms_px: float
+    shift_worst_px: float
+    share: float
+
+
+def with_uncertainty(calibration: Calibration) -> Calibration:
+    """The calibration with its covariances filled in, and with what there is to say about them.
+
+    Returns
+    -------
+    Calibration
+        `covariance` is the honest one. Both are NaN, and a `Problem` says so, where the views do not determine the
+        camera, or would not without one of them. A view on which the result hangs is named in another.
+    """
+    try:
+        equations = normal_equations(calibration)
+        if equations.dof <= 0:
+            raise np.linalg.LinAlgError("no more observations than unknowns")
+        residual = camera_covariance(equations) * equations.cost / equations.dof
+        steps = camera_without_each_view(equations)
+    except np.linalg.LinAlgError as error:
+        message = f"the views do not determine the camera ({error}): take more of them, from different directions"
+        return calibration.with_problems(Problem("undetermined", message))
+    calibration = replace(calibration, covariance_residual=residual)
+    unknown = _why_unknown(calibration, steps)
+    if unknown:
+        return calibration.with_problems(unknown)
+    honest = larger(residual, jackknife_covariance(steps), equations.unknowns.camera)
+    calibration = replace(calibration, covariance=honest)
+    hangs = _hangs_on(calibration, _influence(calibration, steps))
+    return calibration.with_problems(*hangs)
+
+
+def influence(calibration: Calibration) -> tuple[Influence, ...]:
+    """How far each used view alone moves the camera, in order of capture.
+
+    One Newton step a view, everything else solved again; NaN where the others do not determine the camera.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If all views together do not determine it: `with_uncertainty` has said so.
+    """
+    return _influence(calibration, camera_without_each_view(normal_equations(calibration)))
+
+
+def student_factor(views: int, confidence: float = 0.95) -> float:
+    """How many honest sigmas to each side hold the truth with this confidence: Student's t of views - 1 degrees."""
+    return float(stdtrit(views - 1, 0.5 + 0.5 * confidence))
+
+
+def jackknife_covariance(steps: Floats) -> Matrix:
+    """(P, P) from how the parameters move when each view in turn is left out, (V, P)."""
+    spread = steps - steps.mean(axis=0)
+    return np.asarray((len(steps) - 1) / len(steps) * spread.T @ spread)
+
+
+def larger(residual: Matrix, jackknife: Matrix, basis: Matrix) -> Matrix:
+    """(P, P) the smallest covariance that is below neither of two in any direction.
+
+    With the first made the identity by a change of variables, the second's principal variances are raised to one.
+
+    Parameters
+    ----------
+    residual, jackknife : (P, P)
+        The first positive definite within the span of the basis, the second maybe singular.
+    basis : (P, Q)
+        What the parameters may do: fewer columns than rows where fy/fx is held.
+    """
+    inverse = np.linalg.pinv(basis)
+    scale = np.sqrt(np.diag(inverse @ residual @ inverse.T))
+    first, second = (inverse @ c @ inverse.T / np.outer(scale, scale) for c in (residual, jackknife))
+    variances, directions = eigh(second, first)  # directions' first directions = 1
+    back = basis @ (scale[:, None] * (first @ directions))
+    return np.asarray(back * np.maximum(variances, 1.0) @ back.T)
+
+
+def _why_unknown(calibration: Calibration, steps: Floats) -> Problem | None:
+    images = [view.image for view in calibration.observations.used]
+    alone = [image for image, step in zip(images, steps, strict=True) if not np.isfinite(step).all()]
+    if len(images) >= MIN_VIEWS and not alone:
+        return None
+    why = f"without {', '.join(alone)} the others do not determine the camera" if alone else "there are only two views"
+    message = f"the uncertainty cannot be told from the views' agreement, because {why}: take more views"
+    return Problem("uncertainty-unknown", message)
+
+
+def _influence(calibration: Calibration, steps: Floats) -> tuple[Influence, ...]:
+    jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
+    lengths = np.linalg.norm(jacobian @ steps.T, axis=1)  # (N, V) px
+    squares = (lengths**2).mean(axis=0)
+    total = squares.sum()
+    return tuple(
+        Influence(view.image, float(rms), step, float(np.sqrt(square)), float(worst), float(square / (total or 1.0)))
+        for view, rms, step, square, worst in zip(
+            calibration.observations.used, calibration.view_rms_px, steps, squares, lengths.max(axis=0), strict=True
+        )
+    )
+
+
+def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...]) -> tuple[Problem, ...]:
+    """A view that moves the camera farther than all others together, and farther than the residuals explain.
+
+    More than half of the jackknife variance is then one number squared: it has hardly more than one degree of
+    freedom, whatever the number of views, so that even the honest sigma cannot be relied on.
+    """
+    most = max(influences, key=lambda i: i.share)
+    jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
+    explained = np.einsum("nij,jk,nik->n", jacobian, calibration.covariance_residual, jacobian).mean()
+    if not (most.share > 0.5 and most.shift_rms_px**2 > explained):
+        return ()
+    message = (
+        f"this result hangs on {most.image}: left out, it moves what the camera sees by {most.shift_rms_px:.2g} px rms "
+        f"({most.shift_worst_px:.2g} at worst), farther than all other views together; take more views like it, "
+        f"{_place(calibration, most.image)}, or, if something is wrong with it, drop it"
+    )
+    return (Problem("hangs-on-view", message),)
+
+
+def _place(calibration: Calibration, image: str) -> str:
+    index = [view.image for view in calibration.observations.used].index(image)
+    pose = calibration.cam_from_board[index]
+    distance = np.linalg.norm(pose.transform(calibration.board.points.mean(axis=0)[None])[0])
+    tilt = np.degrees(np.arccos(min(1.0, abs(pose.matrix[2, 2]))))
+    return f"with the board {distance:.2f} m away and tilted by {tilt:.0f} degrees"
