@@ -2,7 +2,6 @@
 
 import json
 import os
-from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
 
@@ -15,11 +14,12 @@ from opencsp_calib.quality import set_quality, view_qualities
 from opencsp_calib.report import plots
 from opencsp_calib.report.board_section import board_section
 from opencsp_calib.report.figures import as_image
+from opencsp_calib.report.html import table
 from opencsp_calib.report.photographs import photographs
 from opencsp_calib.report.trust_section import trust_section
 from opencsp_calib.summary import parameter_lines
 
-__all__ = ["table", "write_report"]
+__all__ = ["write_report"]
 
 
 def write_report(calibration: Calibration, path: str | os.PathLike[str], *, before: Calibration | None = None) -> None:
@@ -61,13 +61,6 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str], *, befo
     )
     with replacing(path) as temporary:
         temporary.write_text(page, encoding="utf-8")
-
-
-def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table; what is in it is escaped."""
-    head = "".join(f"<th>{escape(title)}</th>" for title in header)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _summary(calibration: Calibration) -> str:
