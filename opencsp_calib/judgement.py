@@ -24,7 +24,7 @@ COVERAGE_WANTED = 0.5
 ASPECT_SIGMAS = 3.0
 RANGE_SPREAD = 1.1
 DISQUALIFYING = ("poor-rms", "head-on", "fold-inside")
-REMARKS = ("board-shape",)  # decisions told, not doubts
+REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
 
 
 @dataclass(frozen=True)
