@@ -11,6 +11,7 @@ from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Detection, Observations, Problem
+from opencsp_calib.drawing import Drawing, Rectangle
 from opencsp_calib.image import Image
 from opencsp_calib.options import SolveOptions
 
@@ -60,48 +61,6 @@ class Detector(Provided, Protocol):
 
     def detect(self, image: Image, board: Board) -> Detection:
         """The corners found; none, with the reason, where the board is not to be seen. Never raises for an image."""
-
-
-@dataclass(frozen=True)
-class Rectangle:
-    """A black (or white) rectangle of a printable page.
-
-    Parameters
-    ----------
-    x_m, y_m : float
-        Of its upper left corner, from the page's, metres.
-    width_m, height_m : float
-    white : bool
-        Drawn over what came before.
-    """
-
-    x_m: float
-    y_m: float
-    width_m: float
-    height_m: float
-    white: bool = False
-
-
-@dataclass(frozen=True)
-class Drawing:
-    """A board as it is printed: rectangles on a white page, without the margin and the scale bar, which are ours.
-
-    Parameters
-    ----------
-    width_m, height_m : float
-    rectangles : tuple of Rectangle
-        In order of drawing.
-    origin_m : (float, float)
-        Where on the drawing the corner with id 0 is.
-    dark : bool
-        The page, and so its margin, is black: for boards printed white on black.
-    """
-
-    width_m: float
-    height_m: float
-    rectangles: tuple[Rectangle, ...]
-    origin_m: tuple[float, float]
-    dark: bool = False
 
 
 @runtime_checkable

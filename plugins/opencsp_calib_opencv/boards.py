@@ -6,8 +6,8 @@ from types import MappingProxyType
 from typing import Any
 
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard, parse_length
+from opencsp_calib.drawing import Drawing, Rectangle, checkerboard_drawing
 from opencsp_calib.errors import BoardSpecError, MissingDependencyError
-from opencsp_calib.interfaces import Drawing, Rectangle
 from opencsp_calib_opencv.available import missing_opencv
 
 __all__ = ["DICTIONARIES", "CharucoKind", "CheckerboardKind", "opencv_board"]
@@ -50,11 +50,10 @@ class CheckerboardKind:
             raise _explained(spec, error, self) from None
 
     def draw(self, board: Board) -> Drawing:
-        """Squares, the dark one in the upper left corner next to the corner with id 0."""
-        columns, rows, side = board.columns + 1, board.rows + 1, board.spacing_m
-        dark = [(i, j) for j in range(rows) for i in range(columns) if (i + j) % 2 == 0]
-        squares = tuple(Rectangle(i * side, j * side, side, side) for i, j in dark)
-        return Drawing(columns * side, rows * side, squares, (side, side))
+        """Its dark squares; raises BoardSpecError if it is no checkerboard."""
+        if not isinstance(board, Checkerboard):
+            raise BoardSpecError(f"a {board.kind} cannot be drawn as a plain checkerboard")
+        return checkerboard_drawing(board)
 
 
 class CharucoKind:

@@ -145,9 +145,11 @@ def test_a_charuco_board_is_drawn_as_opencv_draws_it(
     np.testing.assert_allclose(board.points + np.append(drawing.origin_m, 0.0), corners, atol=1e-9)
 
 
-def test_only_a_charuco_board_is_drawn_as_one() -> None:
+def test_a_board_of_another_kind_is_not_drawn() -> None:
     with pytest.raises(BoardSpecError, match="cannot be drawn as a ChArUco"):
         CharucoKind().draw(Checkerboard(4, 3, 0.02))
+    with pytest.raises(BoardSpecError, match="cannot be drawn as a plain"):
+        CheckerboardKind().draw(CharucoBoard(4, 3, 0.02, 0.01, "DICT_4X4_50"))
 
 
 def test_parsing_needs_no_opencv_and_drawing_says_so() -> None:
