@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Mask, Params, Points
 from opencsp_calib.board import Board
@@ -15,7 +16,7 @@ from opencsp_calib.models import lens_model
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 
-__all__ = ["ABILITIES", "check_request", "finished"]
+__all__ = ["ABILITIES", "aligned_to_nominal", "check_request", "finished"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -137,6 +138,46 @@ def finished(
                 f"or where {model!r} folds back; {advice}"
             )
     return calibration
+
+
+def aligned_to_nominal(
+    board: Board, points: Points, rotations: Floats, translations: Floats, solved: Mask | None = None
+) -> tuple[Points, Floats, Floats]:
+    """The board as solved, turned, shifted and scaled to the nominal one, with poses that show the same.
+
+    The seven conditions are those of a free network: against the nominal points n, and about their middle, the solved
+    ones p have ``sum (p - n) = 0``, ``sum n x p = 0`` and ``sum n . (p - n) = 0``.
+
+    Parameters
+    ----------
+    board : Board
+        Whose nominal points count.
+    points : (K, 3)
+        As solved, in any frame and unit of length.
+    rotations : (V, 3) rad
+        Rotation vectors, of that frame to the camera.
+    translations : (V, 3)
+        In that unit.
+    solved : (K,) bool, optional
+        Which points were solved for; the others become nominal.
+
+    Returns
+    -------
+    points : (K, 3) m
+    rotations : (V, 3) rad
+    translations : (V, 3) m
+    """
+    solved = np.ones(len(points), dtype=bool) if solved is None else solved
+    nominal, middle = board.nominal_points, board.nominal_points[solved].mean(axis=0)
+    centre = points[solved].mean(axis=0)
+    left, sizes, right = np.linalg.svd((nominal[solved] - middle).T @ (points[solved] - centre))
+    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])  # a mirrored board is none
+    turn = (left * sign) @ right
+    scale = float(((nominal[solved] - middle) ** 2).sum() / (sizes * sign).sum())
+    aligned = np.where(solved[:, None], scale * (points - centre) @ turn.T + middle, nominal)
+    turns = Rotation.from_rotvec(rotations) * Rotation.from_matrix(turn).inv()
+    moved = scale * (translations + Rotation.from_rotvec(rotations).apply(centre)) - turns.apply(middle)
+    return aligned, np.asarray(turns.as_rotvec()), np.asarray(moved)
 
 
 def _on_one_line(points: Points) -> bool:
