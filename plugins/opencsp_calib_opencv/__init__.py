@@ -6,9 +6,18 @@
 from collections.abc import Iterator
 
 from opencsp_calib import hookimpl
-from opencsp_calib.interfaces import Detector
+from opencsp_calib.interfaces import BoardKind, Detector, Solver
 
-__all__ = ["detectors"]
+__all__ = ["boards", "detectors", "solvers"]
+
+
+@hookimpl
+def boards() -> Iterator[BoardKind]:
+    """Plain checkerboards and ChArUco boards."""
+    from opencsp_calib_opencv.boards import CharucoKind, CheckerboardKind
+
+    yield CheckerboardKind()
+    yield CharucoKind()
 
 
 @hookimpl
@@ -21,3 +30,11 @@ def detectors() -> Iterator[Detector]:
     yield CheckerboardDetector()
     yield CharucoDetector()
     yield OpenCSPDetector()
+
+
+@hookimpl
+def solvers() -> Iterator[Solver]:
+    """`calibrateCamera` and `fisheye.calibrate`."""
+    from opencsp_calib_opencv.solver import OpenCVSolver
+
+    yield OpenCVSolver()
