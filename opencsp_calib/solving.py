@@ -13,10 +13,12 @@ from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.models import lens_model
+from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
+from opencsp_calib.schur import factorise
 
-__all__ = ["ABILITIES", "aligned_to_nominal", "check_request", "finished"]
+__all__ = ["ABILITIES", "aligned_to_nominal", "check_request", "finished", "remaining_sigmas"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -26,6 +28,7 @@ ABILITIES = {
     "weights": "weight corners by their covariance",
     "robust": "leave out outlying corners",
 }
+SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this
 MIN_VIEWS = 2  # of a flat board; one view of a plane does not determine a camera
 MIN_CORNERS = 4  # of one view, not on one line
 
@@ -138,6 +141,34 @@ def finished(
                 f"or where {model!r} folds back; {advice}"
             )
     return calibration
+
+
+def remaining_sigmas(calibration: Calibration) -> float:
+    """How far a camera is from the least sum of squares: the length of its next Newton step, in sigmas.
+
+    Zero where the gradient vanishes; infinite where the observations do not determine the camera. For a flat or free
+    board; a warp's unknowns are each solver's own.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Of any solver that minimises the sum of squares that its options ask for.
+    """
+    equations = normal_equations(calibration)
+    gradients = (
+        equations.shared_gradient.sum(axis=0)[:, None],
+        equations.corner_gradient.sum(axis=0)[:, :, None],
+        equations.pose_gradient[:, :, None],
+    )
+    try:
+        factor = factorise(equations)
+    except np.linalg.LinAlgError:
+        return np.inf
+    step = factor.solve(*gradients)[0][:, 0]
+    variance = equations.cost / max(equations.dof, 1)
+    if calibration.options.weights == "equal":
+        variance = max(variance, SMALLEST_NOISE_PX**2)
+    return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
 
 
 def aligned_to_nominal(
