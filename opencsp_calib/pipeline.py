@@ -6,17 +6,20 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import datetime, timezone
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from opencsp_calib import board_shape as shapes
 from opencsp_calib.board import Board
+from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detecting import Progress, Refine, Stop, look_at
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
+from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.models import lens_model
@@ -24,7 +27,7 @@ from opencsp_calib.options import BoardShape, SolveOptions, Weights
 from opencsp_calib.registry import installed
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "calibrate", "detect", "solve"]
+__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "board_from", "calibrate", "detect", "solve"]
 
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
@@ -32,6 +35,22 @@ MIN_VIEWS = 3
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 PixelAspect: TypeAlias = Literal["free", "square"] | float
+
+
+def board_from(text: str) -> Board:
+    """The board that a one-line description, a board file (.json), or a camera file (.h5, its board as solved) names.
+
+    Raises
+    ------
+    InputError
+        If it is none of them; the message shows how a description is written.
+    """
+    path = Path(text)
+    if path.suffix.lower() == ".json":
+        return read_board_file(path, installed().board)
+    if path.suffix.lower() in (".h5", ".hdf5"):
+        return load_calibration(path).board
+    return installed().board(text)
 
 
 def detect(

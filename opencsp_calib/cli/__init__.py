@@ -6,11 +6,12 @@ to standard error; ``--json`` puts one JSON object, and nothing else, on standar
 
 import os
 import sys
+import warnings
 
 import typer
 
 from opencsp_calib.cli import calibrating, cameras, checking, setting_up
-from opencsp_calib.cli.console import complain
+from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.setting_up import print_versions
 from opencsp_calib.errors import CalibError
 
@@ -46,6 +47,7 @@ def main() -> None:
 
 def run(arguments: list[str]) -> int:
     """Run one command, and give its exit code."""
+    warnings.showwarning = lambda message, *_: say(f"warning: {message}")  # one line, without our source code
     try:
         outcome = app(arguments, standalone_mode=False)
     except CalibError as error:

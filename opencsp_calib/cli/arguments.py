@@ -8,7 +8,6 @@ import typer
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
-    from opencsp_calib.board import Board
     from opencsp_calib.camera import Camera
     from opencsp_calib.pipeline import PixelAspect
 
@@ -79,20 +78,6 @@ GuessOption = Annotated[
     Path | None,
     typer.Option("--guess", metavar="CAMERA", help="A camera file to start from.", rich_help_panel=SOLVING),
 ]
-
-
-def board_from(text: str) -> "Board":
-    """The board of a SPEC: a one-line description, a board file, or the solved board of a camera file."""
-    from opencsp_calib.board_file import read_board_file
-    from opencsp_calib.hdf5_calibration import load_calibration
-    from opencsp_calib.registry import installed
-
-    path = Path(text)
-    if path.suffix.lower() in (".json", ".h5", ".hdf5"):
-        if not path.is_file():
-            raise InputError(f"no such board file: {path}")
-        return read_board_file(path, installed().board) if path.suffix == ".json" else load_calibration(path).board
-    return installed().board(text)
 
 
 def aspect_from(text: str | None) -> "PixelAspect | None":

@@ -77,7 +77,7 @@ def calibrate(
     )
     finding = {key: options.pop(key) for key in ("detector", "refine") if key in options}
     started = time.perf_counter()
-    target = args.board_from(board)
+    target = pipeline.board_from(board)
     files = find_images(images)
     record = _record(note or [], pixel_pitch)
     with detection_progress() as progress:
@@ -119,7 +119,7 @@ def detect(
     started = time.perf_counter()
     with detection_progress() as progress:
         found = pipeline.detect(
-            images, args.board_from(board), jobs=jobs, progress=progress, detector=detector, refine=refine
+            images, pipeline.board_from(board), jobs=jobs, progress=progress, detector=detector, refine=refine
         )
     save_observations(found, output)
     seconds = {"detect": time.perf_counter() - started}

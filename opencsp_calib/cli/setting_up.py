@@ -22,9 +22,10 @@ def board(
 ) -> None:
     """Draw a board to print at true size."""
     from opencsp_calib.drawing import write_board
+    from opencsp_calib.pipeline import board_from
     from opencsp_calib.registry import installed
 
-    target = args.board_from(spec)
+    target = board_from(spec)
     write_board(target, installed().boards[target.kind].draw(target), output)
     say(f"board saved: {output}; print it at 100 %, and measure its scale bar")
 
