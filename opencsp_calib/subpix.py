@@ -48,7 +48,7 @@ def refine_subpix(image: Image, detection: Detection) -> Detection:
         chosen = windows == half_window
         size = (int(half_window), int(half_window))
         pixels[chosen] = cv2.cornerSubPix(grey, pixels[chosen].reshape(-1, 1, 2), size, (-1, -1), until).reshape(-1, 2)
-    return replace(detection, pixels=pixels, covariance=None)
+    return replace(detection, pixels=pixels.astype(np.float64), covariance=None)
 
 
 def _half_windows(pixels: Pixels, image_size: tuple[int, int]) -> Floats:

@@ -1,24 +1,40 @@
-"""Finds plain checkerboards."""
+"""Finds plain checkerboards, whole or in part."""
 
-from collections.abc import Callable, Iterator
 from typing import Literal
-
-import numpy as np
-from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.available import missing_opencv
-from opencsp_calib_opencv.grey import eight_bit
-from opencsp_calib_opencv.ordering import first_corner_first
+from opencsp_calib_opencv.explaining import emptiness, two_boards, why_not_placed
+from opencsp_calib_opencv.grid import known
+from opencsp_calib_opencv.levels import levels
+from opencsp_calib_opencv.placing import placed
+from opencsp_calib_opencv.search import found_grids
 
 __all__ = ["CheckerboardDetector"]
 
+MUCH_LARGER = 2.0  # times: a board whose squares are so much smaller is in the background, or on a screen
+
 
 class CheckerboardDetector:
-    """Finds plain checkerboards, quick searches first."""
+    """Finds plain checkerboards: saddles of the grey levels, joined along edges to grids, identified by their margins.
+
+    The photograph is searched reduced, then finer and finer until the whole board is found; every level costs at most a
+    tenth of a second, whether there is a board or not. Each corner must look like one, stand on the lines of its
+    neighbours and fit a smooth projection. A board that is partly out of view or covered gives the corners that can be
+    told for certain, see `placing`; where it cannot be told which they are, it gives none.
+
+    Corners are good to a pixel or better, to be refined by `opencsp_calib.corners`.
+
+    Notes
+    -----
+    Some things a plain checkerboard does not tell. One of 23x18 is one of 18x23, turned: either name finds it, and only
+    the ids differ. A mirror image or a print in white on black is a checkerboard again, of the same columns and rows.
+    Where columns and rows are both even or both odd it looks the same upside down; see `placing` for the end at which
+    ids begin then.
+    """
 
     name = "checkerboard"
     feature: Literal["corner", "own"] = "corner"
@@ -32,31 +48,30 @@ class CheckerboardDetector:
         return isinstance(board, Checkerboard)
 
     def detect(self, image: Image, board: Board) -> Detection:
-        """All corners of the board, ready to be refined, or none."""
-        pixels = eight_bit(image)
-        for search in _searches():
-            grid = search(pixels, board.columns, board.rows)
-            if grid is not None:
-                ordered = first_corner_first(pixels, grid, board.columns, board.rows)
-                if ordered is not None:
-                    return Detection(np.arange(len(board.points)), ordered.reshape(-1, 2))
-        return Detection.nothing(f"no {board.columns}x{board.rows} checkerboard was found")
+        """The corners that can be told for certain; fewer than all, or none, with the reason."""
+        best = Detection.nothing("")
+        largest: Floats | None = None
+        for level in levels(image):
+            grids = found_grids(level)
+            fits = [fit for grid in grids if (fit := placed(level.grey, grid, board))]
+            fits.sort(key=lambda fit: fit.square_px, reverse=True)
+            if len(fits) > 1 and fits[1].square_px * MUCH_LARGER > fits[0].square_px:
+                return Detection.nothing(two_boards(board))
+            if fits and len(fits[0].ids) > len(best):
+                ids, pixels = fits[0].ids, level.to_image(fits[0].pixels)
+                best = Detection(ids, pixels, reason=_incomplete(len(ids), board))
+            if len(best) == len(board.points):
+                break
+            largest = max([grid for grid in (largest, *grids) if grid is not None], key=_count, default=None)
+        if len(best):
+            return best
+        return Detection.nothing(emptiness(image) or why_not_placed(board, largest))
 
 
-Search = Callable[[NDArray[np.uint8], int, int], Floats | None]
+def _incomplete(found: int, board: Board) -> str:
+    missing = len(board.points) - found
+    return f"{missing} of {len(board.points)} corners are out of view, covered or too unclear" if missing else ""
 
 
-def _searches() -> Iterator[Search]:
-    import cv2
-
-    def classic(pixels: NDArray[np.uint8], columns: int, rows: int) -> Floats | None:
-        flags = cv2.CALIB_CB_ADAPTIVE_THRESH + cv2.CALIB_CB_FAST_CHECK + cv2.CALIB_CB_NORMALIZE_IMAGE
-        found, corners = cv2.findChessboardCorners(pixels, (columns, rows), flags=flags)
-        return corners.reshape(rows, columns, 2).astype(np.float64) if found else None
-
-    def robust(pixels: NDArray[np.uint8], columns: int, rows: int) -> Floats | None:
-        found, corners = cv2.findChessboardCornersSB(pixels, (columns, rows))
-        return corners.reshape(rows, columns, 2).astype(np.float64) if found else None
-
-    yield classic
-    yield robust
+def _count(grid: Floats) -> int:
+    return int(known(grid).sum())

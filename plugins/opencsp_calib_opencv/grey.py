@@ -9,8 +9,8 @@ __all__ = ["eight_bit"]
 
 
 def eight_bit(image: Image) -> NDArray[np.uint8]:
-    """Grey levels (height, width), the image's own range scaled to 0..255; never a view that somebody may write to."""
+    """Grey levels (height, width), the image's own range scaled to 0..255; not to be written to."""
     if image.pixels.dtype == np.uint8:
-        return np.ascontiguousarray(image.pixels).view(np.uint8)
+        return np.ascontiguousarray(image.pixels, dtype=np.uint8)
     scale = 255.0 / image.white
-    return np.minimum(np.rint(image.pixels * np.float32(scale)), 255).astype(np.uint8)
+    return np.asarray(np.minimum(np.rint(image.pixels * np.float32(scale)), 255), dtype=np.uint8)

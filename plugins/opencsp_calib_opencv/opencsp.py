@@ -19,8 +19,8 @@ STEPS, STEP_PX = 40, 0.001
 class OpenCSPDetector:
     """`findChessboardCorners`, then `cornerSubPix` with one window for every board: what OpenCSP's window does.
 
-    It keeps OpenCV's order of corners, whichever end that begins at, and reports corners as they come (feature ``own``),
-    so that a calibration with it can be compared with OpenCSP's figure for figure. Prefer ``checkerboard``.
+    It keeps OpenCV's order of corners, whichever end that begins at, and its corners are taken as they come (feature
+    ``own``), so that a calibration with it can be compared with OpenCSP's figure for figure. Prefer ``checkerboard``.
     """
 
     name = "opencsp"

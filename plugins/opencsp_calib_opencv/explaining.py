@@ -1,0 +1,53 @@
+"""Why no board was found, in words that say what to do."""
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.board import Board
+from opencsp_calib.image import Image
+from opencsp_calib_opencv.grid import known
+
+__all__ = ["emptiness", "two_boards", "why_not_placed"]
+
+SAMPLE_STEP = 7  # pixels: a hundredth of the image tells whether there is anything in it
+FLAT = 0.02  # of the image's range, from the 1st to the 99th percentile
+FEWEST_CORNERS = 9
+
+
+def emptiness(image: Image) -> str | None:
+    """What is wrong with an image that shows nothing at all; None where it shows something."""
+    step = max(1, min(SAMPLE_STEP, min(image.size) // 8))
+    darkest, brightest = np.percentile(image.pixels[::step, ::step], [1, 99]) / image.white
+    if brightest - darkest > FLAT:
+        return None
+    if brightest < FLAT:
+        return "the image is black; open the aperture, expose longer or light the board"
+    if darkest > 1 - FLAT:
+        return "the image is saturated; expose shorter or close the aperture"
+    return "the image is blank: all of it is one grey"
+
+
+def why_not_placed(board: Board, grid: Floats | None) -> str:
+    """What the largest grid of corners that was found means for somebody who looks for the board."""
+    wanted = f"{board.columns}x{board.rows}"
+    if grid is None or known(grid).sum() < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
+        return f"no {wanted} checkerboard was found"
+    small, large = sorted(grid.shape[:2])
+    least, most = sorted(board.grid)
+    found = f"{large}x{small}" if board.columns >= board.rows else f"{small}x{large}"
+    if (small + 1, large + 1) == (least, most):
+        return (
+            f"the checkerboard found has {found} inner corners, not {wanted}, which counts its squares; "
+            f"inner corners are one less each way: write {board.kind}:{found}"
+        )
+    if small > least or large > most:
+        return f"the checkerboard found has {found} inner corners, not {wanted}"
+    return (
+        f"only {found} corners in a block were found of {wanted}, and which ones cannot be told; "
+        "show the whole board, or all of it one way and its white margin the other"
+    )
+
+
+def two_boards(board: Board) -> str:
+    """What to do where the board is seen twice."""
+    return f"two {board.columns}x{board.rows} checkerboards are in view; cover one, or leave out the image"

@@ -1,0 +1,91 @@
+"""A grid made whole: corners that do not belong are taken out, those that were overlooked are put in."""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from opencsp_calib.arrays import Floats, Mask, Pixels
+from opencsp_calib_opencv.grid import known, mean_known, padded, predicted, square_height, steps, trimmed
+from opencsp_calib_opencv.rings import look
+
+__all__ = ["grown", "pruned"]
+
+MOST_MISFIT = 0.3  # of the squares' height; perspective itself bends by a tenth, a wrong corner is off by half
+REACH = 0.35  # of the squares' height: how far from its predicted place an overlooked corner is looked for
+RING = 0.3  # of the squares' height: clear of the blur of the next edge
+SMALLEST_RING_PX, LARGEST_RING_PX = 1.8, 10.0
+MOST_UNLIKENESS = 0.3  # looser than without a grid: here place, directions and colours must agree as well; but not
+USUAL_UNLIKENESS = 0.1, 3.0  # more than this, and so many times what is usual in this grid: noise is the same for all
+CONTRAST_FRACTION = 0.15  # of the grid's median: a shadow takes five sixths
+MOST_TURN_RAD = np.radians(20)
+MOST_ROUNDS = 100
+
+
+def pruned(grey: NDArray[np.float32], grid: Floats) -> Floats:
+    """Without the corners that stand off the lines of their neighbours, or do not look like a corner of this grid."""
+    for _ in range(MOST_ROUNDS):
+        misfit = np.linalg.norm(grid - predicted(grid), axis=-1) / square_height(grid)
+        aligned = (np.nan_to_num(misfit) < MOST_MISFIT).all(axis=0) & ~np.isnan(misfit).all(axis=0)
+        keep = aligned & belongs(grey, grid)
+        if (keep == known(grid)).all():
+            break
+        grid = trimmed(np.where(keep[..., None], grid, np.nan))
+    return grid
+
+
+def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels) -> Floats:
+    """With every saddle put in that stands where a corner is missing, inside or beside the grid, and looks like one.
+
+    Where that comes to an end, one line of corners is passed over: a cable or a finger may hide it.
+    """
+    tree = cKDTree(saddles)
+    for _ in range(MOST_ROUNDS):
+        size = known(grid).sum()
+        for distance in (1, 2):
+            grid = _joined(grey, grid, tree, distance)
+            if known(grid).sum() > size:
+                break
+        else:
+            break
+    return grid
+
+
+def _joined(grey: NDArray[np.float32], grid: Floats, saddles: cKDTree, distance: int) -> Floats:
+    """With the saddles that stand where a corner should be, up to so many steps from the known ones."""
+    wider = padded(grid, distance)
+    foretold = wider
+    for _ in range(distance):
+        foretold = np.where(known(foretold)[..., None], foretold, mean_known(predicted(foretold)))
+    empty = ~known(wider) & known(foretold)
+    off, nearest = saddles.query(foretold[empty])
+    hit = off < REACH * np.nan_to_num(square_height(foretold)[empty])
+    tried = np.zeros_like(empty)
+    tried[empty] = hit
+    wider[tried] = saddles.data[nearest[hit]]
+    wider[tried & ~belongs(grey, wider)] = np.nan
+    return trimmed(wider)
+
+
+def belongs(grey: NDArray[np.float32], grid: Floats) -> Mask:
+    """(m, n) whether there is a corner that looks like one of this grid: its edges' directions and its colours right."""
+    there = known(grid)
+    if not there.any():
+        return there
+    height = square_height(grid)[there]
+    rings = look(grey, grid[there], np.clip(np.nan_to_num(RING * height), SMALLEST_RING_PX, LARGEST_RING_PX))
+    row, column = np.nonzero(there)
+    swapped = (row + column) % 2 == 1  # the first edge of one corner is the second of the next
+    edges = np.where(swapped[:, None], rings.edges[:, ::-1], rings.edges)
+    down, on = (np.arctan2(step[there][:, 1], step[there][:, 0]) for step in steps(grid))
+    straight = _turn(edges, np.column_stack([down, on])) < MOST_TURN_RAD
+    crossed = _turn(edges, np.column_stack([on, down])) < MOST_TURN_RAD
+    usual = USUAL_UNLIKENESS[0] + USUAL_UNLIKENESS[1] * float(np.median(rings.unlikeness))
+    good = rings.crossing & (rings.unlikeness < min(MOST_UNLIKENESS, usual))
+    good &= rings.contrast > CONTRAST_FRACTION * np.median(rings.contrast)
+    there[there] = good & (straight if straight.sum() >= crossed.sum() else crossed)
+    return there
+
+
+def _turn(edges: Floats, angles: Floats) -> Floats:
+    """(n,) rad, the larger of the angles between two pairs of lines."""
+    return np.asarray(np.abs((edges - angles + np.pi / 2) % np.pi - np.pi / 2).max(axis=1))

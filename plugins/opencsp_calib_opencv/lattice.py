@@ -1,0 +1,128 @@
+"""Corners joined to grids: each to its neighbour along a common edge, then counted off in columns and rows."""
+
+from collections import deque
+from collections.abc import Iterator, Sequence
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from opencsp_calib.arrays import Floats, Mask
+from opencsp_calib_opencv.rings import sample
+from opencsp_calib_opencv.saddles import Saddles
+
+__all__ = ["grids", "links"]
+
+NEAREST = 12  # a square's dirt and the margin's print may stand nearer than the next corner
+MOST_BEND_RAD = np.radians(17)  # of an edge from corner to corner: perspective, lens and the ring's own error
+EDGE_FRACTION = 0.3  # of a corner's contrast, that its edges must have all along
+
+Links: TypeAlias = NDArray[np.int64]
+Cell: TypeAlias = tuple[int, int]
+Direction: TypeAlias = Sequence[float]  # x, y, of length 1
+
+
+def links(grey: NDArray[np.float32], saddles: Saddles) -> Links:
+    """(n, 4) the neighbour along the first edge, against it, along the second, against it; -1 where there is none.
+
+    Seen from the next corner, an edge has dark on its other hand. So it is the first edge of one and the second of the
+    other, which rules out that a corner is skipped.
+    """
+    n = len(saddles.pixels)
+    found = np.full((n, 4), -1)
+    if n < 2:
+        return found
+    distance, near = cKDTree(saddles.pixels).query(saddles.pixels, k=min(NEAREST + 1, n))
+    distance, near = distance[:, 1:], near[:, 1:]
+    towards = saddles.pixels[near] - saddles.pixels[:, None]
+    angle = np.arctan2(towards[..., 1], towards[..., 0])
+    for edge in (0, 1):
+        here, there = saddles.edges[:, edge, None], saddles.edges[near, 1 - edge]
+        bend, bend_there = _between_lines(angle, here), _between_lines(angle, there)
+        fits = (bend < MOST_BEND_RAD) & (bend_there < MOST_BEND_RAD)
+        ahead = np.cos(angle - here) > 0
+        cost = distance * (1 + 2 * (bend + bend_there))
+        for slot, side in ((2 * edge, ahead), (2 * edge + 1, ~ahead)):
+            least = np.where(fits & side, cost, np.inf)
+            best = least.argmin(axis=1)
+            has = np.isfinite(least[np.arange(n), best])
+            found[has, slot] = near[has, best[has]]
+    return _mutual_and_sharp(grey, saddles, found)
+
+
+def grids(saddles: Saddles, links: Links) -> Iterator[Floats]:
+    """Each connected grid as (m, n, 2) pixels, NaN where there is no corner."""
+    directions = np.stack([np.cos(saddles.edges), np.sin(saddles.edges)], axis=-1)
+    vectors = np.stack([directions[:, 0], -directions[:, 0], directions[:, 1], -directions[:, 1]], axis=1).tolist()
+    neighbours = links.tolist()
+    free = set(np.nonzero((links >= 0).sum(axis=1) >= 2)[0].tolist())
+    while free:
+        cells = _counted_off(min(free), neighbours, vectors)
+        free -= cells.keys()
+        at = np.array(list(cells.values()))
+        at -= at.min(axis=0)
+        grid = np.full((*(at.max(axis=0) + 1), 2), np.nan)
+        grid[at[:, 0], at[:, 1]] = saddles.pixels[list(cells)]
+        yield grid
+
+
+def _counted_off(
+    start: int, neighbours: Sequence[Sequence[int]], vectors: Sequence[Sequence[Direction]]
+) -> dict[int, Cell]:
+    """The cell of each corner that can be reached; where two ways disagree, the shorter counts."""
+    cells: dict[int, Cell] = {start: (0, 0)}
+    taken: set[Cell] = {(0, 0)}
+    queue = deque([(start, 0, 2)])  # and which of its four directions lead one row down, one column on
+    while queue:
+        corner, down, on = queue.popleft()
+        row, column = cells[corner]
+        for slot, cell in (
+            (down, (row + 1, column)),
+            (down ^ 1, (row - 1, column)),
+            (on, (row, column + 1)),
+            (on ^ 1, (row, column - 1)),
+        ):
+            other = neighbours[corner][slot]
+            if other < 0 or other in cells or cell in taken:
+                continue
+            cells[other] = cell
+            taken.add(cell)
+            here, there = vectors[corner], vectors[other]
+            queue.append((other, _continued(here, there, down), _continued(here, there, on)))
+    return cells
+
+
+def _continued(here: Sequence[Direction], there: Sequence[Direction], slot: int) -> int:
+    """The next corner's direction that goes the same way: one of its other edge."""
+    ahead = slot ^ 2
+    (x, y), (u, v) = here[slot], there[ahead]
+    return ahead if x * u + y * v > 0 else ahead ^ 1
+
+
+def _mutual_and_sharp(grey: NDArray[np.float32], saddles: Saddles, found: Links) -> Links:
+    """Only the links that both ends want, and that run along an edge from end to end."""
+    kept = np.full_like(found, -1)
+    everyone = np.arange(len(found))
+    for slot in range(4):
+        other = found[:, slot]
+        backs = found[other][:, [2, 3] if slot < 2 else [0, 1]]
+        mutual = np.nonzero((other >= 0) & (backs == everyone[:, None]).any(axis=1))[0]
+        sharp = mutual[_along_edge(grey, saddles, mutual, other[mutual], dark_first=slot < 2)]
+        kept[sharp, slot] = other[sharp]
+    return kept
+
+
+def _along_edge(grey: NDArray[np.float32], saddles: Saddles, start: Links, end: Links, *, dark_first: bool) -> Mask:
+    if len(start) == 0:
+        return np.zeros(0, dtype=np.bool_)
+    way = saddles.pixels[end] - saddles.pixels[start]
+    across = 0.18 * np.column_stack([-way[:, 1], way[:, 0]])[:, None]
+    between = saddles.pixels[start][:, None] + way[:, None] * np.array([0.3, 0.5, 0.7])[:, None]
+    step = sample(grey, between - across) - sample(grey, between + across)
+    least = EDGE_FRACTION * np.minimum(saddles.contrast[start], saddles.contrast[end])
+    return np.asarray((step if dark_first else -step).min(axis=1) > least)
+
+
+def _between_lines(a: Floats, b: Floats) -> Floats:
+    return np.abs((a - b + np.pi / 2) % np.pi - np.pi / 2)

@@ -1,0 +1,42 @@
+"""Looks for grids of corners in one level of a photograph."""
+
+from scipy.spatial import cKDTree
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib_opencv.grid import known
+from opencsp_calib_opencv.growth import grown, pruned
+from opencsp_calib_opencv.lattice import grids, links
+from opencsp_calib_opencv.levels import Level
+from opencsp_calib_opencv.saddles import corner_like, saddle_pixels
+from opencsp_calib_opencv.smoothness import smooth_part
+
+__all__ = ["found_grids"]
+
+FEWEST_CORNERS = 6  # two rows of three: less is found in any clutter
+MOST_GRIDS = 4
+
+
+def found_grids(level: Level) -> list[Floats]:
+    """The grids (m, n, 2) of corners, largest first, in pixels of the level; NaN where a corner is missing."""
+    saddles = saddle_pixels(level.grey)
+    corners = corner_like(level.grey, saddles)
+    seeds = sorted(grids(corners, links(level.grey, corners)), key=_count, reverse=True)
+    found: list[Floats] = []
+    for seed in seeds[:MOST_GRIDS]:
+        if any(_overlap(seed, grid) for grid in found):  # it has grown there from another seed already
+            continue
+        grid = pruned(level.grey, seed)
+        if _count(grid) >= FEWEST_CORNERS:
+            grid = smooth_part(grown(level.grey, grid, saddles))
+        if _count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
+            found.append(grid)
+    return sorted(found, key=_count, reverse=True)
+
+
+def _overlap(grid: Floats, other: Floats) -> bool:
+    distance, _ = cKDTree(other[known(other)]).query(grid[known(grid)])
+    return bool((distance < 1).mean() > 0.1)
+
+
+def _count(grid: Floats) -> int:
+    return int(known(grid).sum())

@@ -1,0 +1,54 @@
+"""Is a grid of corners the picture of a flat board? Then its pixels are smooth functions of row and column."""
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats, Mask, Matrix
+from opencsp_calib_opencv.grid import known, square_height, trimmed
+
+__all__ = ["smooth_part"]
+
+MOST_MISFIT = 0.12  # of the squares' height, and
+MOST_MISFIT_PX = 0.4  # which saddles are good to
+ORDERS = ((80, 5), (24, 3))  # fewest corners, and the order of polynomial that they determine; below, there is none
+
+
+def smooth_part(grid: Floats) -> Floats:
+    """The grid without the corners that a homography, bent by a polynomial of low order, does not explain.
+
+    Which corners those are is found by leaving out the worst until the others agree.
+    """
+    while known(grid).sum() >= 6:
+        there = known(grid)
+        allowed = MOST_MISFIT * square_height(grid)[there] + MOST_MISFIT_PX
+        misfit = np.nan_to_num(_misfit(grid, there) / allowed, nan=np.inf)
+        worst = misfit.max()
+        if worst <= 1:
+            return grid
+        there[there] = misfit < max(1, 0.6 * worst)
+        grid = trimmed(np.where(there[..., None], grid, np.nan))
+    return grid[:0, :0]
+
+
+def _misfit(grid: Floats, there: Mask) -> Floats:
+    """(k,) px, of the corners that are there."""
+    import cv2
+
+    row, column = np.nonzero(there)
+    rows, columns = there.shape
+    across = np.column_stack([column / max(columns - 1, 1), row / max(rows - 1, 1)]) * 2 - 1
+    pixels = grid[there]
+    homography, _ = cv2.findHomography(across, pixels, 0)
+    if homography is None:
+        return np.full(len(pixels), np.inf)
+    left = pixels - cv2.perspectiveTransform(across[None], homography)[0]
+    order = next((order for fewest, order in ORDERS if len(pixels) >= fewest), None)
+    if order:
+        terms = _products(across, order)
+        left = left - terms @ np.linalg.lstsq(terms, left, rcond=None)[0]
+    return np.asarray(np.linalg.norm(left, axis=1))
+
+
+def _products(across: Matrix, order: int) -> Matrix:
+    """(n, p) all products of x and y up to the order."""
+    x, y = across.T
+    return np.column_stack([x**i * y**j for i in range(order + 1) for j in range(order + 1 - i)])
