@@ -58,6 +58,11 @@ class CornerTable:
         """(N,) the view of each corner."""
         return np.repeat(np.arange(len(self.first) - 1), self.counts)
 
+    @property
+    def typical_weight(self) -> float:
+        """What a residual in pixels is typically multiplied by: the median over corners and axes."""
+        return 1.0 if self.whitening is None else float(np.median(self.whitening[:, [0, 1], [0, 1]]))
+
     def keeping(self, mask: Mask) -> "CornerTable":
         """Only the corners where the mask (N,) is true; a view may be left with none."""
         first = np.concatenate([[0], np.cumsum(mask)])[self.first].astype(np.int64)

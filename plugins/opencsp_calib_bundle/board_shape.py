@@ -1,0 +1,63 @@
+"""The board's shape as solved, laid on the board as given; and the corners that its solution leaves open."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from opencsp_calib.arrays import Ids, Points
+from opencsp_calib.corner_table import CornerTable
+from opencsp_calib.models import LensModel
+from opencsp_calib.unknowns import Estimate
+
+__all__ = ["laid_on", "with_lone_corners"]
+
+
+def laid_on(given: Points, estimate: Estimate, corners: Ids) -> Estimate:
+    """The same estimate in the frame and scale in which its board is nearest to the board as given.
+
+    Images tell a board's shape only up to a shift, a turn and a scale: those seven are chosen so that the corners
+    solved for have none against the given ones, in the sense of least squares (Umeyama 1991). No projection changes.
+
+    Parameters
+    ----------
+    given : (K, 3) m
+    estimate : Estimate
+    corners : (C,) int
+        Ids of the corners solved for; the others are where they are given.
+    """
+    solved, target = estimate.points[corners], given[corners]
+    middle, wanted = solved.mean(axis=0), target.mean(axis=0)
+    left, sizes, right = np.linalg.svd((target - wanted).T @ (solved - middle))
+    # never a mirror image, however flat the board: its third direction is weak
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    turn = left * signs @ right
+    scale = (sizes * signs).sum() / ((solved - middle) ** 2).sum()
+    points = given.copy()
+    points[corners] = scale * (solved - middle) @ turn.T + wanted
+    rotations = estimate.rotations @ turn.T
+    translations = scale * (estimate.translations + estimate.rotations @ middle) - rotations @ wanted
+    return replace(estimate, rotations=rotations, translations=translations, points=points)
+
+
+def with_lone_corners(lens: LensModel, table: CornerTable, estimate: Estimate) -> Estimate:
+    """The same estimate with the corners that one view alone has seen where that view has seen them.
+
+    One view leaves their distance open: of all points that it sees in the corner's pixel, the nearest to where the
+    corner is given. They agree with their pixel whatever the camera, and so tell nothing about it.
+
+    Parameters
+    ----------
+    lens : LensModel
+    table : CornerTable
+        Of all corners.
+    estimate : Estimate
+        Whose board has those corners where they are given.
+    """
+    lone = np.bincount(table.ids, minlength=len(estimate.points))[table.ids] == 1
+    view, ids = table.view[lone], table.ids[lone]
+    rotations = estimate.rotations[view]
+    rays = (lens.unproject(table.pixels[lone], estimate.params)[:, None, :] @ rotations)[:, 0]
+    cameras = -(estimate.translations[view][:, None, :] @ rotations)[:, 0]
+    points = estimate.points.copy()
+    points[ids] = cameras + rays * ((points[ids] - cameras) * rays).sum(axis=1, keepdims=True)
+    return replace(estimate, points=points)

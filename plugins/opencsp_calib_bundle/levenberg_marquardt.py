@@ -1,0 +1,116 @@
+"""Levenberg and Marquardt's iteration on the normal equations of a calibration.
+
+Each unknown's damping is in proportion to its diagonal element (Marquardt), so that metres, radians and distortion
+coefficients need no common scale; how fast it falls follows from how well the last step's promise was kept (Nielsen,
+"Damping parameter in Marquardt's method", 1999).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.corner_table import CornerTable
+from opencsp_calib.models import LensModel
+from opencsp_calib.normal_equations import NormalEquations, linearise
+from opencsp_calib.schur import factorise
+from opencsp_calib.unknowns import Estimate, Unknowns
+
+__all__ = ["ROUGHLY", "TO_THE_END", "Minimum", "minimise"]
+
+ROUGHLY = 1e-4
+"""Tolerance that leaves less than a hundredth of the residuals' norm to gain: enough between two weightings."""
+TO_THE_END = 1e-16
+"""Tolerance after whose last step nothing but rounding is left: the cosine of residuals and any step is below 1e-9."""
+EXACT_PX = 1e-11  # where steps change residuals by less than this, it is rounding, however small the cost
+MAX_STEPS = 200
+MAX_DAMPING = 1e12
+FIRST_DAMPING = 1e-4
+LEAST_DAMPING = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where the iteration ended.
+
+    Parameters
+    ----------
+    estimate : Estimate
+    equations : NormalEquations
+        At the estimate.
+    converged : bool
+    """
+
+    estimate: Estimate
+    equations: NormalEquations
+    converged: bool
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A step of the unknowns, (M, 1), (C, 3, 1) and (V, 6, 1), and how much it promises to lower the cost."""
+
+    parts: tuple[Floats, Floats, Floats]
+    promised: float
+
+
+def minimise(
+    lens: LensModel, table: CornerTable, start: Estimate, unknowns: Unknowns, tolerance: float = TO_THE_END
+) -> Minimum:
+    """The least sum of squared whitened residuals.
+
+    Parameters
+    ----------
+    lens : LensModel
+    table : CornerTable
+    start : Estimate
+        One that sees every corner.
+    unknowns : Unknowns
+    tolerance : float
+        It ends after a step that promised to lower the cost by less than this part.
+
+    Returns
+    -------
+    Minimum
+        Not converged where no step lowers the cost any more, or after too many.
+    """
+    estimate, equations = start, linearise(lens, table, start, unknowns)
+    rounding = EXACT_PX * table.typical_weight * len(table) ** 0.5
+    damping, growth = FIRST_DAMPING, 2.0
+    for _ in range(MAX_STEPS):
+        step = _step(equations, damping)
+        there = _after(lens, table, estimate, unknowns, step) if step else None
+        slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
+        if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
+            damping, growth = damping * growth, growth * 2.0
+            if damping > MAX_DAMPING:
+                break
+            continue
+        kept = (equations.cost - there[1].cost) / step.promised if step.promised > slack else 1.0
+        estimate, equations = there
+        if damping <= FIRST_DAMPING and step.promised <= max(tolerance * equations.cost, rounding**2):
+            return Minimum(estimate, equations, converged=True)
+        damping, growth = max(damping * max(1e-2, 1.0 - (2.0 * kept - 1.0) ** 3), LEAST_DAMPING), 2.0
+    return Minimum(estimate, equations, converged=False)
+
+
+def _step(equations: NormalEquations, damping: float) -> _Step | None:
+    """None where the damped matrix is still singular."""
+    right = (
+        -equations.shared_gradient.sum(axis=0)[:, None],
+        -equations.corner_gradient.sum(axis=0)[:, :, None],
+        -equations.pose_gradient[:, :, None],
+    )
+    try:
+        parts = factorise(equations, damping).solve(*right)
+    except np.linalg.LinAlgError:
+        return None
+    return _Step(parts, float(sum((a * b).sum() for a, b in zip(right, parts, strict=True))))
+
+
+def _after(
+    lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, step: _Step
+) -> tuple[Estimate, NormalEquations]:
+    with np.errstate(all="ignore"):  # a wild step may overflow; then the cost is not lower
+        moved = estimate.moved(unknowns, *(part[..., 0] for part in step.parts))
+        return moved, linearise(lens, table, moved, unknowns)

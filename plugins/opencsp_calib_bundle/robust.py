@@ -1,0 +1,46 @@
+"""Which corners are outliers: weights that let go of them while solving, and a limit beyond which they are named.
+
+While solving, corners count by Cauchy's weights, on a scale taken from the median of the residuals, so that up to
+half of them could be wrong. In the end, what lies beyond `LIMIT` times the scale is left out entirely and the rest is
+solved by least squares, so that the answer is as precise as without outliers and its covariance means something.
+
+The scale is that of the whole set or of the view, whichever is larger: a view that is worse as a whole (blurred, or
+close to a board that is not as flat as it is taken for) is a matter for judging views, not corners.
+"""
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats, Mask
+from opencsp_calib.corner_table import CornerTable
+
+__all__ = ["LIMIT", "outlying", "weights"]
+
+LIMIT = 6.0
+"""In standard deviations per axis. Of independent normal errors, 1.5 in 100 million lie beyond."""
+CAUCHY = 2.385  # standard deviations; keeps 95 % of the precision where errors are normal
+MEDIAN_LENGTH = 1.17741  # of vectors of two normal errors, in standard deviations
+SMALLEST_PX = 1e-6  # errors below are of no interest, even where all others are smaller
+
+
+def weights(table: CornerTable, residuals: Floats) -> Floats:
+    """(N,) factors for whitened residuals by Cauchy's loss, from residuals (N, 2) px; 0 where a corner has no image."""
+    return np.asarray(1.0 / np.sqrt(1.0 + (_in_scales(table, residuals) / CAUCHY) ** 2))
+
+
+def outlying(table: CornerTable, residuals: Floats) -> Mask:
+    """(N,) which corners lie beyond the limit, from residuals (N, 2) px; all that have no image do."""
+    return np.asarray(_in_scales(table, residuals) > LIMIT)
+
+
+def _in_scales(table: CornerTable, residuals: Floats) -> Floats:
+    """(N,) length of the whitened residuals in the larger of the set's and the view's scale."""
+    smallest = np.full(len(table), SMALLEST_PX)
+    if table.whitening is not None:
+        residuals = (table.whitening @ residuals[:, :, None])[:, :, 0]
+        smallest = SMALLEST_PX * table.whitening[:, [0, 1], [0, 1]].max(axis=1)
+    lengths = np.hypot(residuals[:, 0], residuals[:, 1])
+    lengths[np.isnan(lengths)] = np.inf
+    of_views = np.array([np.median(part) for part in np.split(lengths, table.first[1:-1])])
+    scale = np.maximum(np.median(lengths), of_views)[table.view] / MEDIAN_LENGTH
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isinf(lengths), np.inf, lengths / np.maximum(scale, smallest))

@@ -1,0 +1,148 @@
+"""The solver ``bundle``: everything solved for at once, corners weighted, outliers named, the board's shape too."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, SolveOptions
+from opencsp_calib.arrays import Ids, Mask
+from opencsp_calib.corner_table import CornerTable
+from opencsp_calib.models import LENS_MODELS, LensModel
+from opencsp_calib.normal_equations import residuals, solvable_corners
+from opencsp_calib.solving import MIN_CORNERS, check_request, finished
+from opencsp_calib.unknowns import Estimate, Unknowns
+from opencsp_calib_bundle.board_shape import laid_on, with_lone_corners
+from opencsp_calib_bundle.levenberg_marquardt import ROUGHLY, Minimum, minimise
+from opencsp_calib_bundle.robust import outlying, weights
+from opencsp_calib_bundle.start import start, with_deeper_minima
+from opencsp_calib_bundle.verdict import checked_covariance, remarks
+
+__all__ = ["BundleSolver"]
+
+ROUNDS = 10  # of weights, then of outliers: they settle in two or three
+SETTLED = 0.01  # change of a corner's weight from round to round
+
+
+class BundleSolver:
+    """Bundle adjustment in NumPy: Levenberg-Marquardt, poses or corners eliminated by Schur complement.
+
+    Every lens model, with or without the pixel aspect held; the board as given, with a smooth warp, or every corner
+    of it free. Corners count equally or by their covariance; with the robust option, corners that lie six standard
+    deviations out are left out and named, and the rest solved by least squares.
+    """
+
+    name = "bundle"
+    models = frozenset(LENS_MODELS)
+    abilities = frozenset({"board_warp", "board_free", "pixel_aspect", "weights", "robust", "guess"})
+
+    def missing(self) -> str | None:
+        """See `Provided.missing`; nothing ever is."""
+        return None
+
+    def version(self) -> str:
+        """See `Solver.version`; it goes by that of opencsp-calib."""
+        from importlib.metadata import version
+
+        return version("opencsp-calib")
+
+    def solve(self, observations: Observations, model: str, options: SolveOptions) -> Calibration:
+        """See `Solver.solve`.
+
+        The residual covariance of the camera is filled in; the honest one is for `opencsp_calib.uncertainty`.
+        """
+        # corners without a covariance are welcome: they count as the typical one of the others
+        check_request(self, observations, model, replace(options, weights="equal"))
+        lens, given = LENS_MODELS[model], observations.board.points
+        table = CornerTable.of(observations.detections, options.weights)
+        estimate = _roughly(observations, model, options, table)
+        minimum, outliers = _minimum(observations, lens, options, table, estimate)
+        covariance = checked_covariance(observations, lens, options, minimum, table.typical_weight)
+        estimate = minimum.estimate
+        if options.board_shape == "free":
+            estimate = laid_on(given, estimate, minimum.equations.unknowns.corners)
+            estimate = with_lone_corners(lens, table.keeping(~outliers), estimate)
+        calibration = finished(
+            self,
+            observations,
+            model,
+            options,
+            estimate.params,
+            np.array([pose.rotation for pose in estimate.poses]),
+            estimate.translations,
+            board=observations.board.with_points(estimate.points),
+            outliers=table.split(outliers),
+        )
+        calibration = replace(calibration, covariance_residual=covariance)
+        return calibration.with_problems(*remarks(calibration))
+
+
+def _roughly(observations: Observations, model: str, options: SolveOptions, table: CornerTable) -> Estimate:
+    """An estimate near enough to tell outliers from it, with the board as given."""
+    lens = LENS_MODELS[model]
+    unknowns = _unknowns(observations, lens, replace(options, board_shape="flat"))
+    estimate = _weighted(lens, table, start(observations, model, options), unknowns, options.robust)
+    camera = Camera("camera", model, estimate.params, observations.image_size)
+    return with_deeper_minima(observations, camera, estimate, table)
+
+
+def _minimum(
+    observations: Observations, lens: LensModel, options: SolveOptions, table: CornerTable, estimate: Estimate
+) -> tuple[Minimum, Mask]:
+    """The least squares of all corners that are no outliers, and (N,) which are."""
+    outliers = np.zeros(len(table), dtype=bool)
+    unknowns = _unknowns(observations, lens, options, table)
+    if options.board_shape != "flat":
+        estimate = _weighted(lens, _solvable(table, unknowns), estimate, unknowns, options.robust)
+    for _ in range(ROUNDS):
+        before = outliers
+        if options.robust:
+            outliers = _outliers(lens, table, estimate, unknowns)
+        kept = table.keeping(~outliers)
+        _check_counts(observations, kept)
+        unknowns = _unknowns(observations, lens, options, kept)
+        minimum = minimise(lens, _solvable(kept, unknowns), estimate, unknowns)
+        estimate = minimum.estimate
+        if not options.robust or np.array_equal(outliers, before):
+            break
+    return minimum, outliers
+
+
+def _weighted(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, robust: bool) -> Estimate:
+    """Roughly minimised; robustly, by Cauchy's weights, which follow the residuals from round to round."""
+    if not robust:
+        return minimise(lens, table, estimate, unknowns, ROUGHLY).estimate
+    last = np.zeros(len(table))
+    for _ in range(ROUNDS):
+        factors = weights(table, residuals(lens, table, estimate))
+        if np.abs(factors - last).max() < SETTLED:
+            break
+        estimate = minimise(lens, table.weighted(factors), estimate, unknowns, ROUGHLY).estimate
+        last = factors
+    return estimate
+
+
+def _unknowns(
+    observations: Observations, lens: LensModel, options: SolveOptions, table: CornerTable | None = None
+) -> Unknowns:
+    none: Ids = np.empty(0, dtype=np.int64)
+    corners = none if table is None else solvable_corners(table, len(observations.board.points))
+    return Unknowns.of(lens, observations.board, corners, options)
+
+
+def _solvable(table: CornerTable, unknowns: Unknowns) -> CornerTable:
+    """Where corners are solved for one by one, only those."""
+    return table.keeping(np.isin(table.ids, unknowns.corners)) if len(unknowns.corners) else table
+
+
+def _outliers(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns) -> Mask:
+    """(N,); a corner that is solved for from one view alone agrees with it, whatever is wrong."""
+    found = outlying(table, residuals(lens, table, estimate))
+    return found & np.isin(table.ids, unknowns.corners) if len(unknowns.corners) else found
+
+
+def _check_counts(observations: Observations, table: CornerTable) -> None:
+    short = np.flatnonzero(table.counts < MIN_CORNERS)
+    if short.size:
+        image, left = observations.used[int(short[0])].image, int(table.counts[short[0]])
+        message = f"all but {left} corners of {image} are outliers: drop it, or check the board's description"
+        raise CalibrationFailedError(message)
