@@ -54,8 +54,8 @@ def pixel_response(gaussian_px: float, disc_px: float, motion_px: tuple[float, f
 
 def _gaussian(sigma_px: float, samples: int) -> Floats:
     """Weights on an odd number of cells: the integral over each."""
-    # the cells of the pattern and those of the kernel are both squares, each of variance 1/12
-    sigma = np.sqrt(max((sigma_px * samples) ** 2 - 1.0 / 6.0, 0.0))
+    # a step as wide as a cell adds the variance 1/12 to it
+    sigma = np.sqrt(max((sigma_px * samples) ** 2 - 1.0 / 12.0, 0.0))
     reach = int(np.ceil(REACH_SIGMAS * sigma))
     if reach == 0:
         return np.ones(1)
