@@ -13,6 +13,8 @@ __all__ = ["CONVERGED_PX", "LensModel", "inverse_radius", "smallest_positive_roo
 CONVERGED_PX = 1e-9
 """`unproject` iterates until its rays project back to the pixels this closely."""
 
+TINY = 1e-100  # of a polynomial's largest coefficient: higher terms below it overflow the search for roots
+
 
 class LensModel(ABC):
     """A named projection of points in the camera's frame (x right, y down, z forward) to pixels.
@@ -121,7 +123,7 @@ class LensModel(ABC):
 
 def smallest_positive_root(*polynomials: Any) -> float:
     """The smallest positive real root of polynomials (arrays, from the constant term up); infinite if none."""
-    roots = np.concatenate([np.polynomial.Polynomial(p).trim().roots() for p in polynomials])
+    roots = np.concatenate([np.polynomial.Polynomial(p).trim(TINY * np.abs(p).max()).roots() for p in polynomials])
     real = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots)].real
     positive = real[real > 0]
     return float(positive.min()) if positive.size else np.inf
