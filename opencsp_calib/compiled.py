@@ -1,0 +1,77 @@
+"""The compiled fit of corners: compiled once on a machine, kept in a file, loaded when it is first needed.
+
+Importing Numba takes half a second and compiling some seconds; neither happens at import.
+"""
+
+import logging
+import os
+import stat
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TypeAlias
+
+__all__ = ["FitCorners", "corner_fit", "prepare"]
+
+FitCorners: TypeAlias = Callable[..., None]
+
+SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, f8[::1], f8[:, ::1])"
+
+_log = logging.getLogger(__name__)
+_lock = threading.Lock()
+_compiled: list[FitCorners] = []
+
+
+def prepare() -> None:
+    """Begin to load the compiled fit in the background, or to compile it; call it when corners will soon be refined."""
+    if not _compiled:
+        # not a daemon: when the program ends meanwhile, LLVM must not be cut off in mid-work
+        threading.Thread(target=corner_fit, name="compile").start()
+
+
+def corner_fit() -> FitCorners:
+    """`opencsp_calib.corner_kernel.fit_corners`, compiled; waits where another thread is already at it."""
+    with _lock:
+        if not _compiled:
+            _compiled.append(_compile())
+        return _compiled[0]
+
+
+def _compile() -> FitCorners:
+    """With a cache where Numba wants it; where that is not writable or damaged, in a folder of ours; else without."""
+    from numba import njit
+
+    from opencsp_calib.corner_kernel import fit_corners
+
+    def compiled(cache: bool) -> FitCorners:
+        fit: FitCorners = njit(SIGNATURE, cache=cache, nogil=True, error_model="numpy")(fit_corners)
+        return fit
+
+    for place in (nullcontext, _private_cache):
+        try:
+            with place():
+                return compiled(cache=True)
+        except Exception as error:  # read-only, full, damaged: no state of the cache may stop the work
+            _log.debug("no cache for the compiled fit: %r", error)
+    return compiled(cache=False)
+
+
+@contextmanager
+def _private_cache() -> Iterator[None]:
+    """Have Numba keep its cache in a temporary folder that nobody else can write to: it holds code that will be run."""
+    from numba import config
+
+    user = os.geteuid() if hasattr(os, "geteuid") else ""
+    folder = Path(tempfile.gettempdir()) / f"opencsp-calib-compiled-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if user != "" and (not stat.S_ISDIR(found.st_mode) or found.st_uid != user or found.st_mode & 0o077):
+        raise PermissionError(f"{folder} belongs to somebody else")
+    usual = config.CACHE_DIR
+    config.CACHE_DIR = str(folder)
+    try:
+        yield
+    finally:
+        config.CACHE_DIR = usual

@@ -1,0 +1,334 @@
+"""The compiled fit of the image of a checkerboard's corner. Importing this imports Numba: see `opencsp_calib.compiled`.
+
+Around a corner the image is taken as ``light (a + b u v)``. u and v are the profiles, from -1 to 1, of two edges that
+cross in the corner: a step seen through a Gaussian of deviation s. What the product lacks is added to first order: for
+the pixel's own area, which is no Gaussian, by the Gram-Charlier series with the fourth cumulant of a box; for edges
+that are not perpendicular, by the tetrachoric series of the bivariate normal distribution. Edges may be bent, by a
+curvature that is given. ``light`` is ``1 + gx x + gy y``.
+
+Whatever else is wrong with this model is alike on opposite sides of the corner (another psf, neighbouring squares, a
+tone curve) and so does not move it, as long as the window is symmetric about the corner: therefore the window follows
+the corner in every step, and ends in a soft ramp instead of at whole pixels.
+
+The form of the code is ruled by the compiler. One flat buffer with constant offsets, because LLVM vectorises a loop
+only where it can prove that what is written is not read again, and gives up beyond a hundred pairs of columns. No
+slices, because each costs a tenth of a second of compilation. Lengths are asked for, though constant, lest loops be
+unrolled.
+"""
+
+import math
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from opencsp_calib.arrays import Floats
+
+__all__ = ["CONVERGED", "DIAGNOSTICS", "FAILED", "OUTSIDE", "PARAMETERS", "RAMP_PX", "WORK_SIZE", "fit_corners"]
+
+PARAMETERS = 9  # x, y, angle of edge 1, of edge 2, s, a, b, gx, gy
+DIAGNOSTICS = 22
+RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of the window
+
+# Columns of the buffer: derivatives by each parameter, residual, x, y, grey level. The largest window, a parallelogram
+# with sides of 2 * 14 + 1.5 px, holds fewer than 1088 pixels.
+STRIDE = 1088
+RESIDUAL, X, Y, LEVEL = 9 * STRIDE, 10 * STRIDE, 11 * STRIDE, 12 * STRIDE
+WORK_SIZE = 13 * STRIDE
+
+CONVERGED, OUTSIDE, FAILED = 0, 1, 2
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+def _exact(function: Callable[P, T]) -> Callable[P, T]:
+    # NumPy's way to divide, because looking for a zero each time keeps loops from being vectorised
+    made: Callable[P, T] = njit(nogil=True, error_model="numpy")(function)
+    return made
+
+
+def _fast(function: Callable[P, T]) -> Callable[P, T]:
+    # sums may be taken in any order; NaN and infinity keep their meaning
+    options = {"reassoc", "contract", "nsz", "arcp"}
+    made: Callable[P, T] = njit(nogil=True, error_model="numpy", fastmath=options)(function)
+    return made
+
+
+@_fast
+def _profile(z: float, kurtosis: float) -> tuple[float, float]:
+    """The image of an edge (-1 to 1) and its derivative, at z deviations from the edge.
+
+    The exponential is Taylor's polynomial of a 32nd of its argument, squared five times (within 2e-6); the error
+    function is 7.1.26 of Abramowitz and Stegun (within 2e-7). Both are free of branches.
+    """
+    y = min(0.5 * z * z, 20.0) / 32
+    bell = 1.0 - y * (1.0 - y / 2 * (1.0 - y / 3 * (1.0 - y / 4)))
+    bell = bell * bell
+    bell = bell * bell
+    bell = bell * bell
+    bell = bell * bell
+    bell = bell * bell
+    t = 1.0 / (1.0 + 0.23164188 * abs(z))
+    tail = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429)))) * bell
+    density = 0.3989422804014327 * bell
+    z2 = z * z
+    value = math.copysign(1.0 - tail, z) - kurtosis * z * (z2 - 3.0) * density
+    return value, (2.0 + kurtosis * (z2 * (z2 - 6.0) + 3.0)) * density
+
+
+@_exact
+def _overlap(offset: float, slope: float, half: float, low: float, high: float) -> tuple[float, float]:
+    """The part of an interval of x in which ``|slope x - offset| <= half``."""
+    if abs(slope) < 1e-9:
+        return (low, high) if abs(offset) <= half else (1.0, 0.0)
+    middle, reach = offset / slope, half / abs(slope)
+    return max(low, middle - reach), min(high, middle + reach)
+
+
+@_exact
+def _gather(image: NDArray[np.uint16], p: Floats, window: Floats, work: Floats) -> int:
+    """Copy the window's pixels into the buffer, x and y from the corner on; how many, or -1 if some are outside."""
+    height, width = image.shape
+    x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
+    half1, half2 = window[0] + 0.5 * RAMP_PX, window[1] + 0.5 * RAMP_PX
+    sine = abs(x1 * y2 - y1 * x2)
+    reach_x = half1 * abs(x1) + half2 * abs(x2)
+    reach_y = half1 * abs(y1) + half2 * abs(y2)
+    if not (reach_x <= p[0] <= width - 1 - reach_x and reach_y <= p[1] <= height - 1 - reach_y):
+        return -1
+    n = 0
+    for row in range(math.ceil(p[1] - reach_y), math.floor(p[1] + reach_y) + 1):
+        y = row - p[1]
+        low, high = _overlap(x2 * y, y2, half1 * sine, -reach_x, reach_x)
+        low, high = _overlap(x1 * y, y1, half2 * sine, low, high)
+        for column in range(math.ceil(low + p[0]), math.floor(high + p[0]) + 1):
+            work[X + n] = column - p[0]
+            work[Y + n] = y
+            work[LEVEL + n] = image[row, column]
+            n += 1
+    return n
+
+
+@_fast
+def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int, work: Floats) -> float:
+    """Fill the columns: residual and derivatives, each times the root of the pixel's weight; the sum of weights."""
+    s, a, b, gx, gy = p[4], p[5], p[6], p[7], p[8]
+    x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
+    cosine, stretch = x1 * x2 + y1 * y2, 1.0 / abs(x1 * y2 - y1 * x2)
+    box = -1.0 / (1440.0 * s**4)  # the fourth cumulant of a box of width w is -w^4/120; over 12, see _profile
+    kurtosis1, kurtosis2 = box * (x1**4 + y1**4), box * (x2**4 + y2**4)
+    limit1, limit2, clear1, clear2 = window[0] / RAMP_PX + 0.5, window[1] / RAMP_PX + 0.5, window[2], window[3]
+    total = 0.0
+    for k in range(n):
+        x, y = work[X + k], work[Y + k]
+        across1, across2 = y * x1 - x * y1, y * x2 - x * y2
+        along1, along2 = abs(across2) * stretch, abs(across1) * stretch
+        weight = min(max(limit1 - along1 / RAMP_PX, 0.0), 1.0) * min(max(limit2 - along2 / RAMP_PX, 0.0), 1.0)
+        weight *= min(max(max(clear1 - along1, clear2 - along2), 0.0), 1.0)
+        total += weight
+        root = math.sqrt(weight)
+        turn1, turn2 = x * x1 + y * y1, x * x2 + y * y2
+        z1 = (across1 - 0.5 * bend1 * turn1 * turn1) / s
+        z2 = (across2 - 0.5 * bend2 * turn2 * turn2) / s
+        u, du = _profile(z1, kurtosis1)
+        v, dv = _profile(z2, kurtosis2)
+        pattern = u * v + cosine * du * dv * (1.0 + 0.5 * cosine * z1 * z2)
+        light = root * (1.0 + gx * x + gy * y)
+        plain = a + b * pattern
+        slope1 = b / s * light * du * v
+        slope2 = b / s * light * u * dv
+        work[k] = slope1 * y1 + slope2 * y2
+        work[STRIDE + k] = -slope1 * x1 - slope2 * x2
+        work[2 * STRIDE + k] = -slope1 * turn1
+        work[3 * STRIDE + k] = -slope2 * turn2
+        work[4 * STRIDE + k] = -(slope1 * z1 + slope2 * z2)
+        work[5 * STRIDE + k] = light
+        work[6 * STRIDE + k] = light * pattern
+        work[7 * STRIDE + k] = root * x * plain
+        work[8 * STRIDE + k] = root * y * plain
+        work[RESIDUAL + k] = root * work[LEVEL + k] - light * plain
+    return total
+
+
+@_fast
+def _accumulate(work: Floats, n: int, normal: Floats) -> None:
+    """The normal matrix of the columns, its last row that of the residual; lower triangle."""
+    for i in range(len(normal)):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(n):
+                total += work[i * STRIDE + k] * work[j * STRIDE + k]
+            normal[i, j] = total
+
+
+@_exact
+def _factorise(normal: Floats, factor: Floats) -> bool:
+    """Cholesky's factor of the normal matrix; False if there is none."""
+    for i in range(len(factor)):
+        for j in range(i + 1):
+            value = normal[i, j]
+            for k in range(j):
+                value -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = value / factor[j, j]
+            elif value > 1e-12 * normal[i, i]:
+                factor[i, i] = math.sqrt(value)
+            else:
+                return False
+    return True
+
+
+@_exact
+def _solve(factor: Floats, vector: Floats) -> None:
+    """Replace a right-hand side by its solution."""
+    for i in range(len(factor)):
+        for k in range(i):
+            vector[i] -= factor[i, k] * vector[k]
+        vector[i] /= factor[i, i]
+    for i in range(len(factor) - 1, -1, -1):
+        for k in range(i + 1, len(factor)):
+            vector[i] -= factor[k, i] * vector[k]
+        vector[i] /= factor[i, i]
+
+
+@_exact
+def _trusted_part(p: Floats, step: Floats) -> float:
+    """The fraction of a step within which the model is nearly linear."""
+    fraction: float = min(1.0, 1.5 / (math.hypot(step[0], step[1]) + 1e-9))
+    fraction = min(fraction, 0.3 / (max(abs(step[2]), abs(step[3])) + 1e-9))
+    slowest: float = 0.6 * p[4] / (abs(step[4]) + 1e-9)
+    return min(fraction, slowest)
+
+
+@_exact
+def _fit(
+    image: NDArray[np.uint16],
+    p: Floats,
+    bends: Floats,
+    window: Floats,
+    tolerance: float,
+    most_steps: int,
+    work: Floats,
+    normal: Floats,
+    factor: Floats,
+    step: Floats,
+) -> tuple[int, int, float]:
+    """Gauss-Newton's method, a step halved until the misfit falls; status, number of pixels, sum of their weights."""
+    n, weights, best = 0, 0.0, math.inf
+    for _ in range(most_steps):
+        n = _gather(image, p, window, work)
+        if n < 3 * PARAMETERS:
+            return OUTSIDE, n, weights
+        weights = _differentiate(p, bends[0], bends[1], window, n, work)
+        _accumulate(work, n, normal)
+        misfit = normal[PARAMETERS, PARAMETERS] / weights
+        if misfit > 1.0001 * best:
+            for k in range(len(step)):
+                step[k] *= 0.5
+                p[k] -= step[k]
+            continue
+        best = misfit
+        if not _factorise(normal, factor):
+            return FAILED, n, weights
+        for k in range(len(step)):
+            step[k] = normal[PARAMETERS, k]
+        _solve(factor, step)
+        fraction = _trusted_part(p, step)
+        for k in range(len(step)):
+            step[k] *= fraction
+            p[k] += step[k]
+        if math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance:
+            return CONVERGED, n, weights
+    return FAILED, n, weights
+
+
+@_fast
+def _respond(p: Floats, n: int, work: Floats, factor: Floats, row: int, vector: Floats) -> tuple[float, float]:
+    """How far x (row 0) or y (row 1) moves, px, with each edge's bend (1/px); its row of the inverse too."""
+    for k in range(len(vector)):
+        vector[k] = 1.0 if k == row else 0.0
+    _solve(factor, vector)
+    x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
+    response1 = response2 = 0.0
+    for k in range(n):
+        pull = 0.0
+        for i in range(len(vector)):
+            pull += vector[i] * work[i * STRIDE + k]
+        response1 += pull * work[2 * STRIDE + k] * (work[X + k] * x1 + work[Y + k] * y1)
+        response2 += pull * work[3 * STRIDE + k] * (work[X + k] * x2 + work[Y + k] * y2)
+    return 0.5 * response1, 0.5 * response2
+
+
+@_exact
+def _examine(p: Floats, n: int, white: float, work: Floats, found: Floats) -> float:
+    """Each quarter's mean residual and share of saturated pixels; noise, from differences of neighbouring residuals."""
+    x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
+    noise = pairs = 0.0
+    for k in range(n):
+        x, y, weight = work[X + k], work[Y + k], work[5 * STRIDE + k] ** 2
+        quarter = (2 if y * x1 > x * y1 else 0) + (1 if y * x2 > x * y2 else 0)
+        found[10 + quarter] += math.sqrt(weight) * work[RESIDUAL + k]
+        found[14 + quarter] += weight if work[LEVEL + k] >= white else 0.0
+        found[18 + quarter] += weight
+        if k > 0 and work[Y + k - 1] == y:
+            noise += 0.5 * (work[RESIDUAL + k] - work[RESIDUAL + k - 1]) ** 2
+            pairs += weight
+    for quarter in range(4):
+        found[10 + quarter] /= max(found[18 + quarter], 1.0) * max(abs(p[6]), 1e-9)
+        found[14 + quarter] /= max(found[18 + quarter], 1.0)
+    return noise / max(pairs, 1.0)
+
+
+def fit_corners(
+    image: NDArray[np.uint16],
+    white: float,
+    parameters: Floats,
+    bends: Floats,
+    windows: Floats,
+    tolerance: float,
+    most_steps: int,
+    work: Floats,
+    found: Floats,
+) -> None:
+    """Fit corner after corner, in place.
+
+    Parameters
+    ----------
+    image : (height, width) uint16
+    white : float
+        Grey level from which on a pixel is saturated.
+    parameters : (n, 9)
+        In: where to begin. Out: x, y px, angle of edge 1, of edge 2 rad, s px, a, b grey levels, gx, gy 1/px.
+    bends : (n, 2) 1/px
+        Curvature of each edge.
+    windows : (n, 4) px
+        Half the window along each edge; how far from an edge, in the direction of the other, pixels count at all.
+    tolerance : float
+        Of the position, px.
+    most_steps : int
+    work : (WORK_SIZE,)
+        Room to work in.
+    found : (n, 22)
+        In: zeros. Out: status; variance of residuals; variance of noise; the inverse normal matrix of x and y (xx, xy,
+        yy); how x, then y, responds to each edge's bend, px per 1/px; for each quarter of the window its mean residual
+        over the amplitude, its share of saturated pixels, its weight. Quarters 0 and 3 are opposite each other.
+    """
+    normal = np.empty((PARAMETERS + 1, PARAMETERS + 1))
+    factor = np.empty((PARAMETERS, PARAMETERS))
+    vector = np.empty(PARAMETERS)
+    for c in range(len(parameters)):
+        p, result = parameters[c], found[c]
+        status, n, weights = _fit(
+            image, p, bends[c], windows[c], tolerance, most_steps, work, normal, factor, vector
+        )  # fmt: skip
+        result[0] = status
+        if status == CONVERGED:
+            result[1] = normal[PARAMETERS, PARAMETERS] / max(weights - PARAMETERS, 1.0)
+            result[6], result[7] = _respond(p, n, work, factor, 0, vector)
+            result[3], result[4] = vector[0], vector[1]
+            result[8], result[9] = _respond(p, n, work, factor, 1, vector)
+            result[5] = vector[1]
+            result[2] = _examine(p, n, white, work, result)
