@@ -2,8 +2,12 @@
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from worlds import SmallWorld
 
 
 @pytest.fixture(scope="session")
@@ -16,4 +20,20 @@ def data_dir() -> Path:
         if os.environ.get("OPENCSP_CALIB_REQUIRE_DATA") == "1":
             pytest.fail(message)
         pytest.skip(message)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def small_world() -> "SmallWorld":
+    """A camera and a board whose photographs are small enough to render many."""
+    from worlds import SmallWorld
+
+    return SmallWorld.seeded()
+
+
+@pytest.fixture(scope="session")
+def photographs(small_world: "SmallWorld", tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with photographs of the small world, in order."""
+    folder = tmp_path_factory.mktemp("photographs")
+    small_world.photograph(folder)
     return folder
