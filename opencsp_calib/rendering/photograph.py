@@ -12,7 +12,7 @@ from opencsp_calib.image import Image
 from opencsp_calib.pose import Pose
 from opencsp_calib.rendering.blur import pixel_response
 from opencsp_calib.rendering.kernels import light_of
-from opencsp_calib.rendering.pattern import pattern_of
+from opencsp_calib.drawing.pattern import pattern_of
 from opencsp_calib.rendering.scene import Exposure, Scene, Spot, room
 from opencsp_calib.rendering.surface import STEP_PX, look_up
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.drawing import Drawing, Rectangle
+from opencsp_calib.drawing.shapes import Drawing, Rectangle
 
 __all__ = ["Pattern", "pattern_of"]
 
