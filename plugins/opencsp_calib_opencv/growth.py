@@ -67,7 +67,7 @@ def _joined(grey: NDArray[np.float32], grid: Floats, saddles: cKDTree, distance:
 
 
 def belongs(grey: NDArray[np.float32], grid: Floats) -> Mask:
-    """(m, n) whether there is a corner that looks like one of this grid: its edges' directions and its colours right."""
+    """(m, n) whether there is a corner and it looks like one of this grid, by its edges' directions and its colours."""
     there = known(grid)
     if not there.any():
         return there
