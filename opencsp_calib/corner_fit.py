@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opencsp_calib.arrays import Covariances, Floats, Mask, Pixels
+from opencsp_calib.arrays import Covariances, Floats, Ids, Mask, Pixels
 from opencsp_calib.compiled import corner_fit
 
 __all__ = ["CornerFit", "begin", "improve", "windows"]
@@ -63,26 +63,49 @@ class CornerFit:
 
     @property
     def misfit(self) -> Floats:
-        """(n,) what the model leaves beyond noise, root mean square, as a fraction of the amplitude."""
+        """(n,) what is neither noise nor alike on opposite sides, root mean square, as a fraction of the amplitude."""
         excess = np.maximum(self.variance - self.noise_variance, 0)
         return np.asarray(np.sqrt(excess) / np.maximum(np.abs(self.amplitude), 1e-9))
 
     @property
     def variance(self) -> Floats:
-        """(n,) of grey levels about the model: noise, and what the model leaves."""
+        """(n,) of grey levels about the model, without what is alike on opposite sides of the corner and harmless."""
         return np.maximum(self.diagnostics[:, 1], ROUNDING)
 
     @property
     def noise_variance(self) -> Floats:
-        """(n,) of grey levels, from differences of neighbours, which what the model leaves hardly touches."""
+        """(n,) of grey levels about the model, from differences of neighbours: what varies from pixel to pixel only."""
         return np.maximum(self.diagnostics[:, 2], ROUNDING)
 
+    @property
+    def correlation(self) -> float:
+        """Of the noise of neighbouring pixels: compressed, resampled or smoothed images have such, sensors do not."""
+        if not self.converged.any():
+            return 0.0
+        shares = 1 - self.noise_variance[self.converged] / self.variance[self.converged]
+        return float(np.clip(np.median(shares), 0, 0.9))
+
     def covariance(self, bend_deviations: Floats) -> Covariances:
-        """(n, 2, 2) px², when the bends (1/px) that were given are known with these deviations (n, 2)."""
+        """(n, 2, 2) px², when the bends (1/px) that were given are known with these deviations (n, 2).
+
+        Where the noise of neighbouring pixels is correlated, so are their pulls on the corner: fully along the edge, less
+        across, where the pull is a Gaussian's derivative.
+        """
         xx, xy, yy = self.diagnostics[:, 3:6].T
         unit = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
+        across = np.exp(-1 / (4 * self.blur_px**2))
+        variance = self.variance * (1 + 2 * self.correlation) * (1 + 2 * self.correlation * across)
         response = self.diagnostics[:, 6:10].reshape(-1, 2, 2) * bend_deviations[:, None, :]
-        return np.asarray(unit * self.variance[:, None, None] + response @ response.transpose(0, 2, 1))
+        return np.asarray(unit * variance[:, None, None] + response @ response.transpose(0, 2, 1))
+
+    def replaced(self, where: Ids, other: "CornerFit") -> "CornerFit":
+        """The same with other fits (m) at some places (m,)."""
+        parameters, diagnostics = self.parameters.copy(), self.diagnostics.copy()
+        parameters[where], diagnostics[where] = other.parameters, other.diagnostics
+        return CornerFit(parameters, diagnostics)
+
+    def __getitem__(self, where: Ids) -> "CornerFit":
+        return CornerFit(self.parameters[where], self.diagnostics[where])
 
     @property
     def quadrant_misfit(self) -> Floats:

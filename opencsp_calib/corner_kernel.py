@@ -32,11 +32,12 @@ PARAMETERS = 9  # x, y, angle of edge 1, of edge 2, s, a, b, gx, gy
 DIAGNOSTICS = 22
 RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of the window
 
-# Columns of the buffer: derivatives by each parameter, residual, x, y, grey level. The largest window, a parallelogram
-# with sides of 2 * 14 + 1.5 px, holds fewer than 1088 pixels.
+# Columns of the buffer: derivatives by each parameter, residual, x, y, grey level, root of the weight. The largest
+# window, a parallelogram with sides of 2 * 14 + 1.5 px, holds fewer than 1088 pixels.
 STRIDE = 1088
-RESIDUAL, X, Y, LEVEL = 9 * STRIDE, 10 * STRIDE, 11 * STRIDE, 12 * STRIDE
-WORK_SIZE = 13 * STRIDE
+RESIDUAL, X, Y, LEVEL, ROOT = 9 * STRIDE, 10 * STRIDE, 11 * STRIDE, 12 * STRIDE, 13 * STRIDE
+PLACED, SIDE = 14 * STRIDE, 64  # then residuals as a picture, the corner in its middle
+WORK_SIZE = PLACED + SIDE * SIDE
 
 CONVERGED, OUTSIDE, FAILED = 0, 1, 2
 
@@ -149,6 +150,7 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
         work[6 * STRIDE + k] = light * pattern
         work[7 * STRIDE + k] = root * x * plain
         work[8 * STRIDE + k] = root * y * plain
+        work[ROOT + k] = root
         work[RESIDUAL + k] = root * work[LEVEL + k] - light * plain
     return total
 
@@ -215,24 +217,24 @@ def _fit(
     normal: Floats,
     factor: Floats,
     step: Floats,
-) -> tuple[int, int, float]:
-    """Gauss-Newton's method, a step halved until the misfit falls; status, number of pixels, sum of their weights."""
-    n, weights, best = 0, 0.0, math.inf
+) -> tuple[int, int]:
+    """Gauss-Newton's method, a step halved until the misfit falls; status and number of pixels."""
+    n, best = 0, math.inf
     for _ in range(most_steps):
         n = _gather(image, p, window, work)
         if n < 3 * PARAMETERS:
-            return OUTSIDE, n, weights
-        weights = _differentiate(p, bends[0], bends[1], window, n, work)
+            return OUTSIDE, n
+        weight = _differentiate(p, bends[0], bends[1], window, n, work)
         _accumulate(work, n, normal)
-        misfit = normal[PARAMETERS, PARAMETERS] / weights
-        if misfit > 1.0001 * best:
+        misfit = normal[PARAMETERS, PARAMETERS] / weight
+        if misfit > 1.1 * best:  # not just more: as the window moves with the corner, the root is not quite the minimum
             for k in range(len(step)):
                 step[k] *= 0.5
                 p[k] -= step[k]
             continue
-        best = misfit
+        best = min(best, misfit)
         if not _factorise(normal, factor):
-            return FAILED, n, weights
+            return FAILED, n
         for k in range(len(step)):
             step[k] = normal[PARAMETERS, k]
         _solve(factor, step)
@@ -241,8 +243,8 @@ def _fit(
             step[k] *= fraction
             p[k] += step[k]
         if math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance:
-            return CONVERGED, n, weights
-    return FAILED, n, weights
+            return CONVERGED, n
+    return FAILED, n
 
 
 @_fast
@@ -263,23 +265,56 @@ def _respond(p: Floats, n: int, work: Floats, factor: Floats, row: int, vector: 
 
 
 @_exact
-def _examine(p: Floats, n: int, white: float, work: Floats, found: Floats) -> float:
-    """Each quarter's mean residual and share of saturated pixels; noise, from differences of neighbouring residuals."""
+def _examine_quarters(p: Floats, n: int, white: float, work: Floats, found: Floats) -> None:
+    """Each quarter's mean residual, over the amplitude, and its share of saturated pixels."""
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
-    noise = pairs = 0.0
     for k in range(n):
-        x, y, weight = work[X + k], work[Y + k], work[5 * STRIDE + k] ** 2
+        x, y, root = work[X + k], work[Y + k], work[ROOT + k]
         quarter = (2 if y * x1 > x * y1 else 0) + (1 if y * x2 > x * y2 else 0)
-        found[10 + quarter] += math.sqrt(weight) * work[RESIDUAL + k]
-        found[14 + quarter] += weight if work[LEVEL + k] >= white else 0.0
-        found[18 + quarter] += weight
-        if k > 0 and work[Y + k - 1] == y:
-            noise += 0.5 * (work[RESIDUAL + k] - work[RESIDUAL + k - 1]) ** 2
-            pairs += weight
+        found[10 + quarter] += root * work[RESIDUAL + k]
+        found[14 + quarter] += root * root if work[LEVEL + k] >= white else 0.0
+        found[18 + quarter] += root * root
     for quarter in range(4):
         found[10 + quarter] /= max(found[18 + quarter], 1.0) * max(abs(p[6]), 1e-9)
         found[14 + quarter] /= max(found[18 + quarter], 1.0)
-    return noise / max(pairs, 1.0)
+
+
+@_exact
+def _examine_opposites(p: Floats, n: int, work: Floats, found: Floats) -> None:
+    """How much residuals differ from those on the opposite side of the corner, and from those beside them.
+
+    The opposite of a pixel lies between four; where between them is the same for all pixels.
+    """
+    left, top = math.floor(p[0]) - SIDE // 2, math.floor(p[1]) - SIDE // 2
+    for k in range(SIDE * SIDE):
+        work[PLACED + k] = math.nan
+    for k in range(n):
+        if work[ROOT + k] > 0.999:
+            place = (round(work[Y + k] + p[1]) - top) * SIDE + round(work[X + k] + p[0]) - left
+            work[PLACED + place] = work[RESIDUAL + k]
+    right, down = 2 * p[0] - math.floor(2 * p[0]), 2 * p[1] - math.floor(2 * p[1])
+    mirror = math.floor(2 * p[0]) - 2 * left + SIDE * (math.floor(2 * p[1]) - 2 * top)
+    gain = 1.0 + ((1 - right) ** 2 + right**2) * ((1 - down) ** 2 + down**2)
+    unlike = beside = 0.0
+    opposites = neighbours = 0
+    for place in range(SIDE * SIDE):
+        value = work[PLACED + place]
+        other = mirror - place
+        if not 0 <= other < SIDE * (SIDE - 1) - 1 or math.isnan(value):
+            continue
+        upper = (1 - right) * work[PLACED + other] + right * work[PLACED + other + 1]
+        lower = (1 - right) * work[PLACED + other + SIDE] + right * work[PLACED + other + SIDE + 1]
+        difference = value - (1 - down) * upper - down * lower
+        if not math.isnan(difference):
+            unlike += difference**2 / gain
+            opposites += 1
+        step = value - work[PLACED + place + 1]
+        if not math.isnan(step):
+            beside += step**2 / 2
+            neighbours += 1
+    # four parameters took their share of what is not alike on opposite sides: half of all freedoms
+    found[1] = unlike / max(opposites - 8, 1)
+    found[2] = beside / max(neighbours, 1)
 
 
 def fit_corners(
@@ -312,7 +347,8 @@ def fit_corners(
     work : (WORK_SIZE,)
         Room to work in.
     found : (n, 22)
-        In: zeros. Out: status; variance of residuals; variance of noise; the inverse normal matrix of x and y (xx, xy,
+        In: zeros. Out: status; variance of residuals, without what is alike on opposite sides of the corner; variance
+        without what is alike in neighbouring pixels; the inverse normal matrix of x and y (xx, xy,
         yy); how x, then y, responds to each edge's bend, px per 1/px; for each quarter of the window its mean residual
         over the amplitude, its share of saturated pixels, its weight. Quarters 0 and 3 are opposite each other.
     """
@@ -321,14 +357,14 @@ def fit_corners(
     vector = np.empty(PARAMETERS)
     for c in range(len(parameters)):
         p, result = parameters[c], found[c]
-        status, n, weights = _fit(
+        status, n = _fit(
             image, p, bends[c], windows[c], tolerance, most_steps, work, normal, factor, vector
         )  # fmt: skip
         result[0] = status
         if status == CONVERGED:
-            result[1] = normal[PARAMETERS, PARAMETERS] / max(weights - PARAMETERS, 1.0)
             result[6], result[7] = _respond(p, n, work, factor, 0, vector)
             result[3], result[4] = vector[0], vector[1]
             result[8], result[9] = _respond(p, n, work, factor, 1, vector)
             result[5] = vector[1]
-            result[2] = _examine(p, n, white, work, result)
+            _examine_quarters(p, n, white, work, result)
+            _examine_opposites(p, n, work, result)

@@ -22,6 +22,8 @@ __all__ = ["prepare", "refine"]
 # Half-windows as part of a square's side, and at most, px; the first fit has only to come near.
 NEAR_FRACTION, NEAR_PX, NEAR_TOLERANCE_PX = 0.5, 7.0, 0.03
 FULL_FRACTION, FULL_PX, FULL_TOLERANCE_PX = 0.7, 14.0, 0.002
+# For what is disturbed within the full window: outer squares of half a width, dirt, the edge of a shadow.
+SMALL_FRACTION, SMALL_PX, CLEAN_MISFIT = 0.35, 7.0, 0.08
 
 # What is no corner. The limits are far from both sides: a corner leaves 0.05 at most, half a covered quarter 0.5.
 MOST_MOVED_PX = 3.0
@@ -69,6 +71,11 @@ def refine(image: Image, detection: Detection, board: Board) -> Detection:
     halves = windows(near, lengths, image.size, FULL_FRACTION, FULL_PX, clear)
     halves[~came_near] = np.nan
     fit = improve(grey, image.white, near, bent, halves, FULL_TOLERANCE_PX)
+    disturbed = np.flatnonzero(came_near & ~(fit.converged & (fit.misfit < CLEAN_MISFIT)))
+    halves = windows(near, lengths, image.size, SMALL_FRACTION, SMALL_PX, clear)[disturbed]
+    small = improve(grey, image.white, near[disturbed], bent[disturbed], halves, FULL_TOLERANCE_PX)
+    better = small.converged & ~(fit[disturbed].converged & (small.misfit > fit[disturbed].misfit / 2))
+    fit = fit.replaced(disturbed[better], small[better])
     covariance = fit.covariance(deviations)
     reasons = _reasons(fit, detection, covariance, lengths, columns)
     return _judged(image, detection, fit, covariance, reasons)
