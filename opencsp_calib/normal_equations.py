@@ -26,7 +26,7 @@ from opencsp_calib.unknowns import Estimate, Unknowns
 
 __all__ = ["NormalEquations", "linearise", "normal_equations", "residuals", "solvable_corners"]
 
-POSE = 6
+CORNER, POSE = 3, 6  # unknowns each
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +39,7 @@ class NormalEquations:
     dense : (V, M + 7, M + 7)
         Products of [shared | pose | residual] with themselves.
     by_corner : (V, C, 3, M + 10)
-        Products of each corner's shift with [shared | corner | pose | residual].
+        Products of each corner's shift with [corner | shared | pose | residual].
     corner_gauge, pose_gauge : (C, 3, 7), (V, 6, 7)
         The steps that change no projection: three shifts and three turns of the board, and its scale with that of the
         distances. All zero where no corner is solved for.
@@ -62,9 +62,9 @@ class NormalEquations:
     @property
     def dof(self) -> int:
         """Numbers observed minus unknowns: what the cost is divided by to give the variance s²."""
-        views, size = self.dense.shape[:2]
-        solved = size - 1 - POSE + POSE * views + 3 * len(self.unknowns.corners)
-        return self.numbers - int(solved) + (7 if len(self.unknowns.corners) else 0)
+        corners = len(self.unknowns.corners)
+        solved = self.unknowns.shared + POSE * len(self.dense) + 3 * corners - (7 if corners else 0)
+        return self.numbers - solved
 
     @property
     def shared(self) -> Floats:
@@ -92,14 +92,14 @@ class NormalEquations:
         return self.dense[:, -1 - POSE : -1, -1]
 
     @property
-    def corner_shared(self) -> Floats:
-        """(V, C, 3, M)."""
-        return self.by_corner[..., : -4 - POSE]
-
-    @property
     def corner(self) -> Floats:
         """(V, C, 3, 3)."""
-        return self.by_corner[..., -4 - POSE : -1 - POSE]
+        return self.by_corner[..., :CORNER]
+
+    @property
+    def corner_shared(self) -> Floats:
+        """(V, C, 3, M)."""
+        return self.by_corner[..., CORNER : -1 - POSE]
 
     @property
     def corner_pose(self) -> Floats:
@@ -147,27 +147,28 @@ def residuals(lens: LensModel, table: CornerTable, estimate: Estimate) -> Floats
 
 def linearise(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns) -> NormalEquations:
     """The normal equations at an estimate; blocks are NaN where a corner has no image."""
-    views, shared = len(table.first) - 1, unknowns.shared
-    dense = np.zeros((views, shared + POSE + 1, shared + POSE + 1))
-    by_corner = np.zeros((views, len(unknowns.corners), 3, shared + POSE + 4))
-    column = np.full(len(estimate.points), -1)
-    column[unknowns.corners] = np.arange(len(unknowns.corners))
+    views, shared, corners = len(table.first) - 1, unknowns.shared, len(unknowns.corners)
+    dense = np.empty((views, shared + POSE + 1, shared + POSE + 1))
+    by_corner = np.zeros((views, corners, CORNER, CORNER + shared + POSE + 1))
+    column = np.empty(len(estimate.points), dtype=np.int64)
+    column[unknowns.corners] = np.arange(corners)
+    skipped = CORNER if corners else 0
     for begin, end in table.chunks():
-        rows, by_point = _rows(lens, table, estimate, unknowns, (begin, end))
+        rows = _rows(lens, table, estimate, unknowns, (begin, end))
         first = table.first[begin : end + 1] - table.first[begin]
         for view, low, high in zip(range(begin, end), first[:-1], first[1:], strict=True):
-            block = rows[low:high].reshape(-1, shared + POSE + 1)
-            np.matmul(block.T, block, out=dense[view])
-            if len(unknowns.corners):
-                _add_corners(by_corner[view], rows[low:high], by_point[low:high], column[table.ids[_span(table, view)]])
-    gauge = _gauge(estimate, unknowns)
-    return NormalEquations(unknowns, dense, by_corner, *gauge, numbers=2 * len(table))
+            block = rows[low:high].reshape(-1, rows.shape[2])
+            dense[view] = (block.T @ block)[skipped:, skipped:]
+            if corners:
+                columns = column[table.ids[_span(table, view)]]
+                by_corner[view, columns] = rows[low:high, :, :CORNER].transpose(0, 2, 1) @ rows[low:high]
+    return NormalEquations(unknowns, dense, by_corner, *_gauge(estimate, unknowns), numbers=2 * len(table))
 
 
 def _rows(
     lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, views: tuple[int, int]
-) -> tuple[Floats, Floats]:
-    """Of a run of views: (n, 2, M + 7) of [shared | pose | residual], and (n, 2, 3) by the point on the board."""
+) -> Floats:
+    """Of a run of views, whitened, (n, 2, ...): [shared | pose | residual], and before them [corner] if solved for."""
     begin, end = views
     span = slice(table.first[begin], table.first[end])
     turned = _turned(table, estimate, begin, end)
@@ -175,26 +176,20 @@ def _rows(
         turned + _shifts(table, estimate, begin, end), estimate.params
     )
     cameras, shared = unknowns.camera.shape[1], unknowns.shared
-    rows = np.empty((len(pixels), 2, shared + POSE + 1))
+    skipped = CORNER if len(unknowns.corners) else 0
+    all_rows = np.empty((len(pixels), 2, skipped + shared + POSE + 1))
+    rows = all_rows[:, :, skipped:]
     rows[:, :, :cameras] = by_params if cameras == len(estimate.params) else by_params @ unknowns.camera
     a, j = turned[:, None, :], by_point
     for axis, (one, two) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[:, :, shared + axis] = a[:, :, one] * j[:, :, two] - a[:, :, two] * j[:, :, one]
     rows[:, :, shared + 3 : shared + POSE] = by_point
     rows[:, :, -1] = pixels - table.pixels[span]
-    if shared > cameras or len(unknowns.corners):
-        by_point = by_point @ np.repeat(estimate.rotations[begin:end], table.counts[begin:end], axis=0)
-    if shared > cameras:
-        rows[:, :, cameras:shared] = by_point @ unknowns.warp[table.ids[span]]
-    if table.whitening is not None:
-        rows, by_point = table.whitening[span] @ rows, table.whitening[span] @ by_point
-    return rows, by_point
-
-
-def _add_corners(out: Floats, rows: Floats, by_point: Floats, columns: Ids) -> None:
-    """Fill one view's products of corner shifts with everything."""
-    everything = np.concatenate([rows[:, :, : -1 - POSE], by_point, rows[:, :, -1 - POSE :]], axis=2)
-    out[columns] = by_point.transpose(0, 2, 1) @ everything
+    if skipped or shared > cameras:
+        by_board = by_point @ np.repeat(estimate.rotations[begin:end], table.counts[begin:end], axis=0)
+        all_rows[:, :, :skipped] = by_board[:, :, :skipped]
+        rows[:, :, cameras:shared] = by_board @ unknowns.warp[table.ids[span]]
+    return all_rows if table.whitening is None else table.whitening[span] @ all_rows
 
 
 def _gauge(estimate: Estimate, unknowns: Unknowns) -> tuple[Floats, Floats]:

@@ -13,10 +13,10 @@ held, since more than seven conditions bias the answer.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky, solve_triangular
 
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.normal_equations import NormalEquations
+from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["Factorisation", "camera_covariance", "camera_without_each_view", "factorise"]
 
@@ -38,8 +38,8 @@ class Factorisation:
         What ties the eliminated blocks to the rest, multiplied by the inverse roots.
     scale : (kept + M,)
         One over the root of the dense matrix's diagonal.
-    root : (kept + M, kept + M)
-        Lower Cholesky factor of the scaled dense matrix: of what was kept, then of the M shared unknowns.
+    root : CholeskyRoot
+        Of the scaled dense matrix (kept + M, kept + M): of what was kept, then of the M shared unknowns.
     shared : int
         M.
     """
@@ -48,14 +48,14 @@ class Factorisation:
     inverse_roots: Floats
     coupling: Floats
     scale: Floats
-    root: Matrix
+    root: CholeskyRoot
     shared: int
 
     @property
     def shared_covariance(self) -> Matrix:
         """(M, M) inverse of the shared unknowns' information; multiply by s² for their covariance."""
-        tail = self.root[-self.shared :, -self.shared :]
-        half = solve_triangular(tail, np.diag(self.scale[-self.shared :]), lower=True)
+        tail = self.root.lower[-self.shared :, -self.shared :]
+        half = np.linalg.inv(tail) * self.scale[-self.shared :]
         return np.asarray(half.T @ half)
 
     def solve(self, shared: Floats, corner: Floats, pose: Floats) -> tuple[Floats, Floats, Floats]:
@@ -65,7 +65,7 @@ class Factorisation:
         inner = self.inverse_roots @ dropped
         right = np.concatenate([kept.reshape(-1, columns), shared])
         right = right - _flat(self.coupling).T @ inner.reshape(-1, columns)
-        dense = self.scale[:, None] * cho_solve((self.root, True), self.scale[:, None] * right, check_finite=False)
+        dense = self.scale[:, None] * self.root.solve(self.scale[:, None] * right)
         inner = inner - (_flat(self.coupling) @ dense).reshape(inner.shape)
         dropped = self.inverse_roots.transpose(0, 2, 1) @ inner
         kept = dense[: len(dense) - self.shared].reshape(kept.shape)
@@ -83,8 +83,8 @@ def factorise(equations: NormalEquations, damping: float = 0.0) -> Factorisation
     """
     views, corners = equations.corner.shape[:2]
     poses_kept = 6 * views < 3 * corners
-    by_corner = equations.by_corner[..., : equations.shared.shape[1] + 3].sum(axis=0)
-    corner, corner_shared = by_corner[..., -3:], by_corner[..., :-3]
+    by_corner = equations.by_corner[..., : 3 + equations.unknowns.shared].sum(axis=0)
+    corner, corner_shared = by_corner[..., :3], by_corner[..., 3:]
     pose, pose_shared = equations.pose, equations.shared_pose.transpose(0, 2, 1)
     if poses_kept:
         kept, kept_shared, gauge = pose, pose_shared, equations.pose_gauge
@@ -94,13 +94,13 @@ def factorise(equations: NormalEquations, damping: float = 0.0) -> Factorisation
         kept, kept_shared, gauge = corner, corner_shared, equations.corner_gauge
         dropped, dropped_shared = pose, pose_shared
         cross = equations.corner_pose.transpose(0, 3, 1, 2)
-    roots = np.linalg.cholesky(_damped(dropped, damping))
+    inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(dropped, damping)))
     cross = np.concatenate([cross.reshape(*dropped.shape[:2], len(kept) * kept.shape[1]), dropped_shared], axis=2)
-    coupling = np.linalg.inv(roots) @ cross
+    coupling = inverse_roots @ cross
     shared = _damped(equations.shared.sum(axis=0), damping)
     reduced = _assembled(_damped(kept, damping), kept_shared, shared) - _flat(coupling).T @ _flat(coupling)
     scale, root = _scaled_root(reduced, gauge.reshape(-1, gauge.shape[2]))
-    return Factorisation(poses_kept, np.linalg.inv(roots), coupling, scale, root, len(shared))
+    return Factorisation(poses_kept, inverse_roots, coupling, scale, root, len(shared))
 
 
 def camera_covariance(equations: NormalEquations) -> Matrix:
@@ -145,10 +145,10 @@ def _without_directly(equations: NormalEquations) -> Floats:
     for view, (matrix, right) in enumerate(zip(rest, rest_gradient, strict=True)):
         scale = 1.0 / np.sqrt(np.diag(matrix))
         try:
-            root = cholesky(scale[:, None] * matrix * scale, lower=True)
+            root = CholeskyRoot.of(scale[:, None] * matrix * scale)
         except np.linalg.LinAlgError:
             continue  # stays NaN: the other views leave something open
-        steps[view] = -scale * cho_solve((root, True), scale * right)
+        steps[view] = -scale * root.solve((scale * right)[:, None])[:, 0]
     return steps
 
 
@@ -199,9 +199,9 @@ def _view_product(equations: NormalEquations, inverse_pose: Floats, x: Floats) -
     ours, corners = x[:, :shared, None], x[:, shared:].reshape(views, -1, 3, 1)
     by_corner = equations.by_corner.reshape(views, -1, shared + 10)
     from_corners = by_corner.transpose(0, 2, 1) @ x[:, shared:, None]
-    pose = equations.shared_pose.transpose(0, 2, 1) @ ours + from_corners[:, shared + 3 : -1]
-    of_shared = equations.shared @ ours + from_corners[:, :shared]
-    of_corners = (equations.corner @ corners).reshape(views, -1) + (by_corner[..., :shared] @ ours)[..., 0]
+    pose = equations.shared_pose.transpose(0, 2, 1) @ ours + from_corners[:, 3 + shared : -1]
+    of_shared = equations.shared @ ours + from_corners[:, 3 : 3 + shared]
+    of_corners = (equations.corner @ corners).reshape(views, -1) + (by_corner[..., 3 : 3 + shared] @ ours)[..., 0]
     return np.concatenate([of_shared[..., 0], of_corners], axis=1) - _from_pose(equations, inverse_pose @ pose)
 
 
@@ -225,7 +225,7 @@ def _flat(blocks: Floats) -> Floats:
 
 
 def _damped(blocks: Floats, damping: float) -> Floats:
-    return blocks + damping * blocks * np.eye(blocks.shape[-1])
+    return blocks * (1.0 + damping * np.eye(blocks.shape[-1]))
 
 
 def _assembled(blocks: Floats, cross: Floats, shared: Floats) -> Matrix:
@@ -241,7 +241,7 @@ def _assembled(blocks: Floats, cross: Floats, shared: Floats) -> Matrix:
     return dense
 
 
-def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, Matrix]:
+def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     """Scale and lower Cholesky factor of a dense matrix, with the gauge's projector added; see `Factorisation`."""
     diagonal = np.diag(dense)
     if not (diagonal > 0).all():
@@ -251,4 +251,4 @@ def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, Matrix]:
     if gauge.any():
         free, _ = np.linalg.qr(gauge / scale[: len(gauge), None])
         scaled[: len(gauge), : len(gauge)] += free @ free.T
-    return scale, cholesky(scaled, lower=True, overwrite_a=True)
+    return scale, CholeskyRoot.of(scaled)
