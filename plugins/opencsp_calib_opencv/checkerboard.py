@@ -10,6 +10,7 @@ from opencsp_calib_opencv.available import missing_opencv
 from opencsp_calib_opencv.explaining import emptiness, two_boards, why_not_placed
 from opencsp_calib_opencv.grid import known
 from opencsp_calib_opencv.levels import levels
+from opencsp_calib_opencv.margins import sides_seen
 from opencsp_calib_opencv.placing import placed
 from opencsp_calib_opencv.search import found_grids
 
@@ -49,10 +50,9 @@ class CheckerboardDetector:
 
     def detect(self, image: Image, board: Board) -> Detection:
         """The corners that can be told for certain; fewer than all, or none, with the reason."""
-        best = Detection.nothing("")
-        largest: Floats | None = None
+        best, largest, whole = Detection.nothing(""), None, False
         for level in levels(image):
-            grids = found_grids(level)
+            grids = found_grids(level, board)
             fits = [fit for grid in grids if (fit := placed(level.grey, grid, board))]
             fits.sort(key=lambda fit: fit.square_px, reverse=True)
             if len(fits) > 1 and fits[1].square_px * MUCH_LARGER > fits[0].square_px:
@@ -62,10 +62,11 @@ class CheckerboardDetector:
                 best = Detection(ids, pixels, reason=_incomplete(len(ids), board))
             if len(best) == len(board.points):
                 break
-            largest = max([grid for grid in (largest, *grids) if grid is not None], key=_count, default=None)
+            if grids and (largest is None or _count(grids[0]) > _count(largest)):
+                largest, whole = grids[0], all(sides_seen(level.grey, grids[0]))
         if len(best):
             return best
-        return Detection.nothing(emptiness(image) or why_not_placed(board, largest))
+        return Detection.nothing(emptiness(image) or why_not_placed(board, largest, whole))
 
 
 def _incomplete(found: int, board: Board) -> str:

@@ -27,8 +27,16 @@ def emptiness(image: Image) -> str | None:
     return "the image is blank: all of it is one grey"
 
 
-def why_not_placed(board: Board, grid: Floats | None) -> str:
-    """What the largest grid of corners that was found means for somebody who looks for the board."""
+def why_not_placed(board: Board, grid: Floats | None, whole: bool) -> str:
+    """What the largest grid of corners that was found means for somebody who looks for the board.
+
+    Parameters
+    ----------
+    board : Board
+    grid : (m, n, 2) px, optional
+    whole : bool
+        Whether a margin is seen all around it.
+    """
     wanted = f"{board.columns}x{board.rows}"
     if grid is None or known(grid).sum() < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
         return f"no {wanted} checkerboard was found"
@@ -40,7 +48,7 @@ def why_not_placed(board: Board, grid: Floats | None) -> str:
             f"the checkerboard found has {found} inner corners, not {wanted}, which counts its squares; "
             f"inner corners are one less each way: write {board.kind}:{found}"
         )
-    if small > least or large > most:
+    if whole or small > least or large > most:
         return f"the checkerboard found has {found} inner corners, not {wanted}"
     return (
         f"only {found} corners in a block were found of {wanted}, and which ones cannot be told; "

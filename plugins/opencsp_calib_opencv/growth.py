@@ -33,14 +33,17 @@ def pruned(grey: NDArray[np.float32], grid: Floats) -> Floats:
     return grid
 
 
-def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels) -> Floats:
+def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, longest: int) -> Floats:
     """With every saddle put in that stands where a corner is missing, inside or beside the grid, and looks like one.
 
-    Where that comes to an end, one line of corners is passed over: a cable or a finger may hide it.
+    Where that comes to an end, one line of corners is passed over: a cable or a finger may hide it. A grid of more than
+    `longest` rows or columns is none that is looked for, and grows no further: a tiled floor would take seconds.
     """
     tree = cKDTree(saddles)
     for _ in range(MOST_ROUNDS):
         size = known(grid).sum()
+        if max(grid.shape[:2]) > longest:
+            break
         for distance in (1, 2):
             grid = _joined(grey, grid, tree, distance)
             if known(grid).sum() > size:

@@ -10,7 +10,6 @@ from opencsp_calib_opencv.rings import look
 
 __all__ = ["Saddles", "corner_like", "saddle_pixels"]
 
-MOST_SADDLES = 6000
 RING_PX = 4.0
 MOST_UNLIKENESS = 0.22  # opposite places differ by less even where noise is a fifth of the contrast
 LEAST_CONTRAST = 0.01  # two to three grey levels of 8 bits
@@ -37,8 +36,8 @@ class Saddles:
         return Saddles(self.pixels[mask], self.edges[mask], self.contrast[mask])
 
 
-def saddle_pixels(grey: NDArray[np.float32]) -> Pixels:
-    """(n, 2) pixels of the most marked saddles, to a fraction of a pixel.
+def saddle_pixels(grey: NDArray[np.float32], most: int) -> Pixels:
+    """(n, 2) pixels of the most marked saddles, so many at most, to a fraction of a pixel.
 
     A saddle is where the determinant of the second derivatives is most negative; one Newton step from there leads to
     where the gradient vanishes (Lucchese and Mitra, 2002).
@@ -54,8 +53,8 @@ def saddle_pixels(grey: NDArray[np.float32]) -> Pixels:
     inside = np.zeros_like(peak)
     inside[border:-border, border:-border] = True
     y, x = np.nonzero(peak & inside)
-    if len(x) > MOST_SADDLES:
-        strongest = np.argpartition(strength[y, x], -MOST_SADDLES)[-MOST_SADDLES:]
+    if len(x) > most:
+        strongest = np.argpartition(strength[y, x], -most)[-most:]
         x, y = x[strongest], y[strongest]
     gx, gy = (grey[y, x + 1] - grey[y, x - 1]) / 2, (grey[y + 1, x] - grey[y - 1, x]) / 2
     a, b, c, s = xx[y, x], xy[y, x], yy[y, x], strength[y, x]

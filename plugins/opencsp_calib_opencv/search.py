@@ -3,6 +3,7 @@
 from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats
+from opencsp_calib.board import Board
 from opencsp_calib_opencv.grid import known
 from opencsp_calib_opencv.growth import grown, pruned
 from opencsp_calib_opencv.lattice import grids, links
@@ -14,20 +15,28 @@ __all__ = ["found_grids"]
 
 FEWEST_CORNERS = 6  # two rows of three: less is found in any clutter
 MOST_GRIDS = 4
+CLUTTER = 5000  # saddles beside the board's, in a photograph full of leaves or print
+MUCH_LONGER = 2  # times as many rows or columns as the board: a tiled floor, not worth the time to complete
 
 
-def found_grids(level: Level) -> list[Floats]:
-    """The grids (m, n, 2) of corners, largest first, in pixels of the level; NaN where a corner is missing."""
-    saddles = saddle_pixels(level.grey)
+def found_grids(level: Level, board: Board) -> list[Floats]:
+    """The grids (m, n, 2) of corners, largest first, in pixels of the level; NaN where a corner is missing.
+
+    Those with more rows or columns than the board are not complete.
+    """
+    saddles = saddle_pixels(level.grey, most=CLUTTER + 2 * len(board.points))
     corners = corner_like(level.grey, saddles)
     seeds = sorted(grids(corners, links(level.grey, corners)), key=_count, reverse=True)
+    longest = max(board.grid)
     found: list[Floats] = []
     for seed in seeds[:MOST_GRIDS]:
         if any(_overlap(seed, grid) for grid in found):  # it has grown there from another seed already
             continue
-        grid = pruned(level.grey, seed)
-        if _count(grid) >= FEWEST_CORNERS:
-            grid = smooth_part(grown(level.grey, grid, saddles))
+        grid = seed
+        if max(seed.shape) <= MUCH_LONGER * longest:
+            grid = pruned(level.grey, seed)
+            if _count(grid) >= FEWEST_CORNERS:
+                grid = smooth_part(grown(level.grey, grid, saddles, longest))
         if _count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
             found.append(grid)
     return sorted(found, key=_count, reverse=True)
