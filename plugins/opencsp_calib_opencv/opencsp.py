@@ -39,7 +39,9 @@ class OpenCSPDetector:
         import cv2
 
         pixels = eight_bit(image)
-        flags = cv2.CALIB_CB_ADAPTIVE_THRESH + cv2.CALIB_CB_FAST_CHECK + cv2.CALIB_CB_NORMALIZE_IMAGE
+        # OpenCSP asks for a fast check too, but its flags land in the place of another argument, so that OpenCV's
+        # defaults are what it really runs with; they find more, and sooner
+        flags = cv2.CALIB_CB_ADAPTIVE_THRESH + cv2.CALIB_CB_NORMALIZE_IMAGE
         if min(pixels.shape) <= 2 * HALF_WINDOW_PX + 5:  # cornerSubPix refuses images no larger than its window
             return Detection.nothing(f"the image is only {image.size[0]}x{image.size[1]} pixels")
         found, corners = cv2.findChessboardCorners(pixels, board.grid, flags=flags)
