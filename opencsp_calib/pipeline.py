@@ -196,18 +196,13 @@ def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
     InputError
     """
     lens_model(model)  # an unknown one is refused first
-    able = [s for _, s in sorted(installed().solvers.items()) if s.missing() is None]
-    if model not in engine.models:
-        others = ", ".join(s.name for s in able if model in s.models) or "none that is installed"
-        raise InputError(f"the solver {engine.name!r} has no lens model {model!r}; solvers that have it: {others}")
-    lacking = options.asked - engine.abilities
-    if lacking:
-        others = ", ".join(s.name for s in able if options.asked <= s.abilities and model in s.models)
-        what = ", ".join(sorted(lacking))
-        raise InputError(
-            f"the solver {engine.name!r} is not able to do what is asked ({what}); "
-            f"solvers that are: {others or 'none that is installed'}"
-        )
+    lacking = ", ".join(sorted(options.asked - engine.abilities))
+    if model in engine.models and not lacking:
+        return
+    what = f"is not able to do what is asked ({lacking})" if lacking else f"has no lens model {model!r}"
+    solvers = sorted(installed().solvers.values(), key=lambda solver: solver.name)
+    able = [s.name for s in solvers if model in s.models and options.asked <= s.abilities and s.missing() is None]
+    raise InputError(f"the solver {engine.name!r} {what}; solvers that are able: {', '.join(able) or 'none installed'}")
 
 
 def usable_cores() -> int:
