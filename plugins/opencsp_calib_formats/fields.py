@@ -14,6 +14,8 @@ __all__ = ["Fields", "matrix", "number", "numbers", "whole"]
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 MAX_NUMBERS = 2_000_000
+MAX_SIDE = 1_000_000  # pixels, as in Camera
+MAX_NUMBER = 1e100  # beyond it polynomials overflow
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 
 
@@ -59,6 +61,13 @@ class Fields:
         if default is not None and self.values.get(name) is None:
             return default
         return number(self.raw(name), self.path(name))
+
+    def positive(self, name: str, default: float | None = None) -> float:
+        """A finite number above zero."""
+        value = self.number(name, default)
+        if not value > 0:
+            raise FileFormatError(f"{self.path(name)} is {value:g}, it must be positive")
+        return value
 
     def whole(self, name: str, default: int | None = None) -> int:
         """A whole number."""
@@ -106,7 +115,12 @@ class Fields:
 
     def size(self, width: str, height: str) -> tuple[int, int]:
         """An image size of two fields."""
-        return self.whole(width), self.whole(height)
+        return _image_size(self.whole(width), self.whole(height), self.where or "the image")
+
+    def size_pair(self, name: str) -> tuple[int, int]:
+        """An image size of one field [width, height]."""
+        width, height = self.numbers(name, 2)
+        return _image_size(whole(width, self.path(name)), whole(height, self.path(name)), self.path(name))
 
 
 def number(value: Any, what: str) -> float:
@@ -119,8 +133,8 @@ def number(value: Any, what: str) -> float:
         result = float(value)
     except OverflowError:
         result = np.inf
-    if not np.isfinite(result):
-        raise FileFormatError(f"{what} is {_shown(value)}, not a finite number")
+    if not abs(result) <= MAX_NUMBER:
+        raise FileFormatError(f"{what} is {_shown(value)}, not a finite number that a camera could have")
     return result
 
 
@@ -155,6 +169,12 @@ def matrix(value: Any, what: str, rows: int, columns: int) -> Floats:
             raise FileFormatError(f"{what} has {len(value)} rows, expected {rows}")
         flat = numbers(value, what)
     return _counted(flat, what, (rows * columns,)).reshape(rows, columns)
+
+
+def _image_size(width: int, height: int, what: str) -> tuple[int, int]:
+    if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE):
+        raise FileFormatError(f"{what} has {width}x{height} pixels: no image size")
+    return width, height
 
 
 def _mapped(fields: Fields) -> tuple[Floats, tuple[int, int] | None]:

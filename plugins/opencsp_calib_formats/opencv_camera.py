@@ -5,14 +5,14 @@ from pathlib import Path
 
 import numpy as np
 
-from opencsp_calib import InputError, Problem
+from opencsp_calib import Camera, InputError, Problem
 from opencsp_calib.arrays import Floats, Params, Pixels, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib.models import lens_model
 
-__all__ = ["MODEL_OF_COUNT", "either_model", "opencv_camera", "params_of", "through_matrix"]
+__all__ = ["MODEL_OF_COUNT", "carried", "either_model", "opencv_camera", "params_of", "through_matrix"]
 
 MODEL_OF_COUNT = {0: "pinhole", 4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
 
@@ -94,3 +94,33 @@ def params_of(path: Path, model: str, params: Params, carried: tuple[str, ...], 
     if model not in carried:
         raise InputError(f"cannot write {path}: {title} does not carry {model}, only {', '.join(carried)}")
     return params[4:]
+
+
+def carried(camera: Camera, models: tuple[str, ...], path: Path, title: str) -> tuple[str, Params]:
+    """The model to write a camera as, and its coefficients: exactly the same projection, with zeros added or left out.
+
+    Parameters
+    ----------
+    camera : Camera
+    models : tuple of str
+        What the format carries.
+    path, title
+        For the message.
+
+    Raises
+    ------
+    InputError
+        If none of the models is exact; the message names the coefficients in the way.
+    """
+    if camera.model in models:
+        return camera.model, camera.distortion
+    counts = {model: count for count, model in MODEL_OF_COUNT.items()}
+    needed = int(np.flatnonzero(camera.distortion).max(initial=-1)) + 1
+    if camera.model in counts:
+        for model in sorted((m for m in models if m in counts), key=counts.__getitem__):
+            if counts[model] >= needed:
+                padded = np.concatenate([camera.distortion, np.zeros(14)])
+                return model, padded[: counts[model]]
+    names = camera.lens.distortion_names[:needed]
+    way = f", {names[-1]} = {camera.distortion[needed - 1]:g} is in the way" if camera.model in counts and names else ""
+    raise InputError(f"cannot write {path}: {title} carries {', '.join(models)}, not {camera.model}{way}; see --fit")

@@ -1,25 +1,38 @@
 """What all formats of this plugin share: nothing to install, and errors that name the file."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
 from opencsp_calib import Camera, InputError, Problem
 from opencsp_calib.errors import FileFormatError
+from opencsp_calib.interfaces import Imported
 
-__all__ = ["FileFormat", "naming", "not_a_result", "unverified"]
+__all__ = ["FileFormat", "decimal", "naming", "not_a_result", "only_one", "unverified"]
 
 
-class FileFormat:
+class FileFormat(ABC):
     """The part of a `CameraFormat` that does not differ: formats that need no vendor, read only unless they say so."""
 
+    name: str
     title: str
+    extensions: tuple[str, ...]
+    models: tuple[str, ...]
     reads = True
     writes = False
 
     def missing(self) -> str | None:
         """Nothing ever is."""
         return None
+
+    @abstractmethod
+    def recognises(self, path: Path) -> bool:
+        """See `CameraFormat.recognises`."""
+
+    @abstractmethod
+    def read(self, path: Path) -> Mapping[str, Imported]:
+        """See `CameraFormat.read`."""
 
     def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
         """See `CameraFormat.write`."""
@@ -32,7 +45,7 @@ def naming(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        message = str(error)
+        message = " ".join(str(error).split())  # parsers' messages have several lines
         raise FileFormatError(message if str(path) in message else f"{path}: {message}") from error
 
 
@@ -44,3 +57,17 @@ def unverified(message: str) -> Problem:
 def not_a_result(message: str) -> Problem:
     """The note on numbers that are an initial guess and no calibration."""
     return Problem("not-a-result", message)
+
+
+def decimal(value: float) -> str:
+    """A number in full precision, as every YAML, JSON and ini reader takes for one: ``1.0e-05``, not ``1e-05``."""
+    text = repr(float(value))
+    mantissa, e, exponent = text.partition("e")
+    return f"{mantissa}.0{e}{exponent}" if e and "." not in mantissa else text
+
+
+def only_one(cameras: Mapping[str, Camera], path: Path, title: str) -> Camera:
+    """The camera, if there is one only; InputError otherwise."""
+    if len(cameras) != 1:
+        raise InputError(f"cannot write {path}: {title} holds one camera, not {len(cameras)}; choose one with --camera")
+    return next(iter(cameras.values()))

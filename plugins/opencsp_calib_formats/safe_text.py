@@ -10,7 +10,7 @@ import importlib
 import json
 import re
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from opencsp_calib.errors import FileFormatError
 
 tomllib: Any = importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
 
-__all__ = ["Repeated", "head", "parse_json", "parse_toml", "parse_xml", "parse_yaml", "read_bytes", "read_text"]
+__all__ = ["Repeated", "head", "once", "parse_json", "parse_toml", "parse_xml", "parse_yaml", "read_bytes", "read_text"]
 
 MAX_BYTES = 32 * 2**20
 MAX_YAML = 8 * 2**20  # its parser takes a second a megabyte where nesting is deep
@@ -201,9 +201,9 @@ def parse_json(text: str) -> Any:
     _check_containers(text)
     try:
         try:
-            value = json.loads(text, object_pairs_hook=_pairs)
+            value = json.loads(text, object_pairs_hook=once)
         except ValueError:
-            value = json.loads(JSON_TOKEN.sub(_strict_json, text), object_pairs_hook=_pairs)
+            value = json.loads(JSON_TOKEN.sub(_strict_json, text), object_pairs_hook=once)
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"not valid JSON: {error}") from None
     _check_depth(value)
@@ -220,7 +220,8 @@ def _strict_json(token: re.Match[str]) -> str:
     return f"{token[0]}0" if token[0].endswith(".") else token[0]
 
 
-def _pairs(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def once(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """A dictionary of pairs; `Repeated` stands where a key has two different values."""
     values: dict[str, Any] = {}
     for key, value in pairs:
         _set_once(values, key, value)

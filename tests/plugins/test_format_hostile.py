@@ -1,0 +1,167 @@
+"""Files that are damaged, hostile or not what they seem: only our own errors come out, in bounded time."""
+
+import re
+import time
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+from format_files import FILES
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from opencsp_calib.errors import CalibError
+from opencsp_calib.importing import exact
+from opencsp_calib.interfaces import CameraFormat, Imported
+from opencsp_calib.registry import installed
+
+CASES = [(name, file) for name, files in FILES.items() for file in files]
+STRANGE = [b"nan", b"inf", b"-inf", b"-1", b"0", b"1e308", b"-1e300", b"1e-308", b"9" * 400, b"1e999", b"1_0", b"0x10"]
+STRANGE += [
+    b"",
+    b"null",
+    b"[]",
+    b"{}",
+    b'""',
+    b"true",
+    b"\xff\xfe",
+    b"\x00",
+    b"\xc3\x28",
+    b"\xe2\x80\xae",
+    b"1;2",
+    b"&x;",
+]
+RAYS = np.array(
+    [[0.0, 0.0, 1.0], [0.1, -0.2, 1.0], [0.5, 0.4, 1.0], [1.0, 0.0, 0.0], [0.0, 0.1, -1.0], [0.0, 0.0, -1.0]]
+)
+FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def format_of(name: str) -> CameraFormat:
+    return installed().camera_formats[name]
+
+
+def use(imported: Imported) -> None:
+    """What everybody does with an import."""
+    if imported.resize is not None and imported.image_size is None:
+        use(imported.resize((1000, 800)))
+    if imported.project is not None:
+        assert imported.project(RAYS).shape == (len(RAYS), 2)
+    if not imported.obstacles and imported.image_size is not None:
+        camera = exact(imported)
+        assert camera.image_size == imported.image_size
+        assert np.isfinite(camera.params).all()
+        camera.project(RAYS)
+
+
+def try_to_read(format_: CameraFormat, path: Path, data: bytes) -> None:
+    """Read and use what a file holds; our own errors are fine, others are not."""
+    path.write_bytes(data)
+    assert format_.recognises(path) in (True, False)
+    message = ""
+    try:
+        cameras: Mapping[str, Imported] = format_.read(path)
+        for imported in list(cameras.values())[:5]:
+            use(imported)
+    except CalibError as error:
+        message = str(error)
+    assert "\n" not in message
+    assert len(message) < 600 + len(str(path))
+
+
+def numbers(data: bytes) -> Iterator[tuple[int, int]]:
+    """Where the numbers of a file are."""
+    return (match.span() for match in re.finditer(rb"(?<![\w.])-?\d+\.?\d*(?:e[+-]?\d+)?", data))
+
+
+@pytest.mark.parametrize(("name", "file"), CASES)
+def test_the_file_itself_is_recognised_by_its_format_alone_and_read(name: str, file: str, tmp_path: Path) -> None:
+    path = tmp_path / file
+    path.write_bytes(FILES[name][file])
+    formats = installed().camera_formats
+    assert [key for key in formats if formats[key].reads and formats[key].recognises(path)] == [name]
+    cameras = format_of(name).read(path)
+    assert cameras
+    for imported in cameras.values():
+        use(imported)
+
+
+@pytest.mark.parametrize(("name", "file"), CASES)
+def test_truncated_at_every_byte(name: str, file: str, tmp_path: Path) -> None:
+    data, format_ = FILES[name][file], format_of(name)
+    for length in range(len(data)):
+        try_to_read(format_, tmp_path / file, data[:length])
+
+
+@pytest.mark.parametrize(("name", "file"), CASES)
+def test_strange_things_in_the_place_of_each_number(name: str, file: str, tmp_path: Path) -> None:
+    data, format_ = FILES[name][file], format_of(name)
+    for start, end in numbers(data):
+        for strange in STRANGE:
+            try_to_read(format_, tmp_path / file, data[:start] + strange + data[end:])
+
+
+@pytest.mark.parametrize(("name", "file"), CASES)
+@FEW
+@given(seed=st.integers(0, 2**32), changes=st.integers(1, 6))
+def test_pieces_deleted_doubled_moved_and_replaced(
+    name: str, file: str, tmp_path: Path, seed: int, changes: int
+) -> None:
+    chance, data = np.random.default_rng(seed), bytearray(FILES[name][file])
+    for _ in range(changes):
+        start = int(chance.integers(len(data) + 1))
+        piece = bytes(data[start : start + int(chance.choice([1, 1, 2, 8, 40]))])
+        strange, byte = STRANGE[chance.integers(len(STRANGE))], bytes([chance.integers(256)])
+        data[start : start + len(piece)] = [b"", piece * 2, strange, byte, piece[::-1]][chance.integers(5)]
+    try_to_read(format_of(name), tmp_path / file, bytes(data))
+
+
+@pytest.mark.parametrize("name", sorted(installed().camera_formats))
+@FEW
+@given(data=st.binary(max_size=200))
+def test_random_bytes(name: str, tmp_path: Path, data: bytes) -> None:
+    if format_of(name).reads:
+        try_to_read(format_of(name), tmp_path / "file", data)
+
+
+@pytest.mark.parametrize("name", sorted(installed().camera_formats))
+@pytest.mark.parametrize(
+    "opening", [b"[", b'{"a":', b"<a>", b"- ", b"a:\n ", b"a = ", b"[[a.", b"&a [*a,", b'{"cameras":[']
+)
+def test_deeply_nested(name: str, opening: bytes, tmp_path: Path) -> None:
+    started = time.perf_counter()
+    if format_of(name).reads:
+        try_to_read(format_of(name), tmp_path / "file", opening * 100_000)
+    assert time.perf_counter() - started < 5
+
+
+@pytest.mark.parametrize("name", sorted(installed().camera_formats))
+def test_no_file_no_text_and_a_folder(name: str, tmp_path: Path) -> None:
+    format_ = format_of(name)
+    if not format_.reads:
+        return
+    for path in (tmp_path / "none", tmp_path):
+        assert not format_.recognises(path)
+        with pytest.raises(CalibError):
+            format_.read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("bundler", b"# Bundle file v0.3\n1152921504606846976 5\n9e2 0 0\n"),
+        ("bundler", b"# Bundle file v0.3\n300000 0\n" + b"9e2 0 0 1 0 0 0 1 0 0 0 1 0 0 0\n" * 300_000),
+        ("nvm", b"NVM_V3\n\n1152921504606846976\na 9e2 1 0 0 0 0 0 0 0 0\n"),
+        ("nvm", b"NVM_V3\n\n300000\n" + b"a 9e2 1 0 0 0 0 0 0 0 0\n" * 300_000),
+        ("opensfm", b"[" + b'{"cameras":{"a":{"projection_type":"dual","width":9,"height":9}}},' * 100_000 + b"{}]"),
+        ("transforms_json", b'{"frames": [' + b",".join(b'{"fl_x": %d}' % i for i in range(1, 100_000)) + b"]}"),
+    ],
+)
+def test_claims_and_heaps_of_cameras_cost_little(name: str, data: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    path.write_bytes(data)
+    started = time.perf_counter()
+    with pytest.raises(CalibError):
+        format_of(name).read(path)
+    assert time.perf_counter() - started < 10
