@@ -18,7 +18,7 @@ from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.schur import factorise
 
-__all__ = ["ABILITIES", "aligned_to_nominal", "check_request", "finished", "remaining_sigmas"]
+__all__ = ["ABILITIES", "check_request", "finished", "laid_on_given", "remaining_sigmas"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -171,26 +171,26 @@ def remaining_sigmas(calibration: Calibration) -> float:
     return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
 
 
-def aligned_to_nominal(
-    board: Board, points: Points, rotations: Floats, translations: Floats, solved: Mask | None = None
+def laid_on_given(
+    board: Board, points: Points, rotations: Floats, translations: Floats, solved: Mask
 ) -> tuple[Points, Floats, Floats]:
-    """The board as solved, turned, shifted and scaled to the nominal one, with poses that show the same.
+    """A board as solved, turned, shifted and scaled to the board as given, with poses that show the same.
 
-    The seven conditions are those of a free network: against the nominal points n, and about their middle, the solved
-    ones p have ``sum (p - n) = 0``, ``sum n x p = 0`` and ``sum n . (p - n) = 0``.
+    Images tell a board's shape up to a similarity: it is chosen so that the corners solved for lie nearest to the
+    given ones, in the sense of least squares (Umeyama 1991). These seven conditions and no more: others bias the rest.
 
     Parameters
     ----------
     board : Board
-        Whose nominal points count.
+        As given.
     points : (K, 3)
         As solved, in any frame and unit of length.
     rotations : (V, 3) rad
         Rotation vectors, of that frame to the camera.
     translations : (V, 3)
         In that unit.
-    solved : (K,) bool, optional
-        Which points were solved for; the others become nominal.
+    solved : (K,) bool
+        Which points count.
 
     Returns
     -------
@@ -198,17 +198,16 @@ def aligned_to_nominal(
     rotations : (V, 3) rad
     translations : (V, 3) m
     """
-    solved = np.ones(len(points), dtype=bool) if solved is None else solved
-    nominal, middle = board.nominal_points, board.nominal_points[solved].mean(axis=0)
-    centre = points[solved].mean(axis=0)
-    left, sizes, right = np.linalg.svd((nominal[solved] - middle).T @ (points[solved] - centre))
-    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])  # a mirrored board is none
+    wanted, found = board.points[solved].mean(axis=0), points[solved].mean(axis=0)
+    left, sizes, right = np.linalg.svd((board.points[solved] - wanted).T @ (points[solved] - found))
+    # never a mirror image, however flat the board: its third direction is weak
+    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])
     turn = (left * sign) @ right
-    scale = float(((nominal[solved] - middle) ** 2).sum() / (sizes * sign).sum())
-    aligned = np.where(solved[:, None], scale * (points - centre) @ turn.T + middle, nominal)
-    turns = Rotation.from_rotvec(rotations) * Rotation.from_matrix(turn).inv()
-    moved = scale * (translations + Rotation.from_rotvec(rotations).apply(centre)) - turns.apply(middle)
-    return aligned, np.asarray(turns.as_rotvec()), np.asarray(moved)
+    scale = float((sizes * sign).sum() / ((points[solved] - found) ** 2).sum())
+    laid = scale * (points - found) @ turn.T + wanted
+    before = Rotation.from_rotvec(rotations)
+    after = before * Rotation.from_matrix(turn).inv()
+    return laid, after.as_rotvec(), scale * (translations + before.apply(found)) - after.apply(wanted)
 
 
 def _on_one_line(points: Points) -> bool:

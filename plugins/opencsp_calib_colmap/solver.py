@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Points
 from opencsp_calib.initial import initial_camera, initial_poses
-from opencsp_calib.solving import aligned_to_nominal, check_request, finished
+from opencsp_calib.solving import check_request, finished, laid_on_given
 from opencsp_calib_colmap.cameras import HALF_PIXEL, MODELS, colmap_params, our_params
 
 __all__ = ["ColmapSolver"]
@@ -55,10 +55,11 @@ class ColmapSolver:
         rotations, translations = _poses(scene, len(poses))
         board = observations.board
         if options.board_shape == "free":
-            seen = np.zeros(len(board.points), dtype=bool)
-            seen[np.concatenate([d.ids for d in observations.detections])] = True
+            # a corner seen only once is solved for too, but only to be somewhere on its ray
+            times = np.bincount(np.concatenate([d.ids for d in observations.detections]), minlength=len(board.points))
             points = _points(scene, len(board.points))
-            points, rotations, translations = aligned_to_nominal(board, points, rotations, translations, seen)
+            points, rotations, translations = laid_on_given(board, points, rotations, translations, times > 1)
+            points[times == 0] = board.points[times == 0]
             board = board.with_points(points)
         else:
             translations = translations * unit

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from opencsp_calib import Board, Calibration, CalibrationFailedError, InputError, Observations, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, checked
 from opencsp_calib.initial import initial_camera, initial_poses
-from opencsp_calib.solving import aligned_to_nominal, check_request, finished
+from opencsp_calib.solving import check_request, finished, laid_on_given
 from opencsp_calib_mrcal.process import missing_mrcal, mrcal_version, run_mrcal
 
 __all__ = ["MrcalSolver"]
@@ -92,8 +92,8 @@ class MrcalSolver:
         poses = _answer(solution, "poses", (views, 6))
         rotations, translations = poses[:, :3], poses[:, 3:] * unit
         if options.board_shape == "warp":
-            points = _answer(solution, "board", (rows * columns, 3)) * unit
-            points, rotations, translations = aligned_to_nominal(board, points, rotations, translations)
+            points, every = _answer(solution, "board", (rows * columns, 3)) * unit, np.ones(rows * columns, dtype=bool)
+            points, rotations, translations = laid_on_given(board, points, rotations, translations, every)
             board = board.with_points(points)
         outliers: list[Mask] | None = None
         if options.robust:
