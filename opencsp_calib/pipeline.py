@@ -27,7 +27,7 @@ from opencsp_calib.options import BoardShape, SolveOptions, Weights
 from opencsp_calib.registry import installed
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "board_from", "calibrate", "detect", "solve"]
+__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "board_from", "calibrate", "detect", "places_of", "solve"]
 
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
@@ -185,7 +185,13 @@ def calibrate(
 ) -> Calibration:
     """Photographs to a calibration: `detect`, then `solve`, whose options it takes by name."""
     of_detect = {key: options.pop(key) for key in ("detector", "refine", "jobs", "progress", "stop") if key in options}
+    options.setdefault("provenance", places_of(images))
     return solve(detect(images, board, **of_detect), model, solver, **options)
+
+
+def places_of(images: Images) -> dict[str, Any]:
+    """Where images are, to be kept as provenance: a report shows them again from there."""
+    return {"images": {file.name: str(file.path.absolute()) for file in find_images(images)}}
 
 
 def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:

@@ -83,9 +83,12 @@ def calibrate(
     with detection_progress() as progress:
         observations = pipeline.detect(images, target, jobs=jobs, progress=progress, **finding)
     detected = time.perf_counter()
-    provenance = {"images": {file.name: str(file.path.absolute()) for file in files}}
     options |= args.given(guess=args.guess_from(guess))
-    options |= {"name": name or files[0].path.absolute().parent.name, "record": record, "provenance": provenance}
+    options |= {
+        "name": name or files[0].path.absolute().parent.name,
+        "record": record,
+        "provenance": pipeline.places_of(images),
+    }
 
     def run(views: "Observations") -> "Calibration":
         return pipeline.solve(views, **options)

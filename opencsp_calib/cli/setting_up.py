@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table
+from opencsp_calib.cli.console import detection_progress, print_json, progress_bar, say, say_problems, say_table
 
 if TYPE_CHECKING:
     from opencsp_calib.calibration import Calibration
@@ -64,13 +64,8 @@ def demo(
     from opencsp_calib.report import write_report
 
     started = time.perf_counter()
-    with detection_progress("Rendering photographs") as progress:
-        world = make_demo(
-            folder,
-            views,
-            jobs=jobs or pipeline.usable_cores(),
-            progress=lambda done, total: progress(done, total, None),
-        )
+    with progress_bar("Rendering photographs") as advance:
+        world = make_demo(folder, views, jobs=jobs or pipeline.usable_cores(), progress=advance)
     rendered = time.perf_counter()
     with detection_progress() as progress:
         calibration = pipeline.calibrate(world.images, world.board, name="demo", jobs=jobs, progress=progress)

@@ -94,8 +94,9 @@ def coverage_plot(calibration: Calibration) -> "Figure":
     size = calibration.camera.image_size
     image_axes(axes, size)
     pixels, _ = _pixels_and_residuals(calibration)
-    cells = (24, round(24 * size[1] / size[0]))
-    counts, x, y = np.histogram2d(*pixels.T, bins=cells, range=((-0.5, size[0] - 0.5), (-0.5, size[1] - 0.5)))
+    across, down = 24, max(1, round(24 * size[1] / size[0]))
+    x, y = np.linspace(-0.5, size[0] - 0.5, across + 1), np.linspace(-0.5, size[1] - 0.5, down + 1)
+    counts, _, _ = np.histogram2d(pixels[:, 0], pixels[:, 1], bins=[x, y])
     shown = axes.pcolormesh(x, y, np.where(counts > 0, counts, np.nan).T, cmap=COLOURS)
     figure.colorbar(shown, ax=axes, label="corners", shrink=0.8)
     axes.set_facecolor("#eeeeee")
