@@ -12,7 +12,7 @@ from opencsp_calib.interfaces import Provided
 __all__ = ["CHECKS"]
 
 PROBE = "import sys, {module}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))"
-CORE = "opencsp_calib.solving, opencsp_calib.importing, yaml, defusedxml.ElementTree"
+CORE = "opencsp_calib.registry, opencsp_calib.solving, opencsp_calib.importing, yaml, defusedxml.ElementTree"
 """What the core itself loads when plugins are listed, and parsers of text that plugins may load too."""
 
 
