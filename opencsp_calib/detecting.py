@@ -20,7 +20,7 @@ from opencsp_calib.subpix import refine_subpix
 
 __all__ = ["Progress", "Refine", "Stop", "find_board", "look_at"]
 
-MIN_CORNERS = 8  # a pose has 6 unknowns, 4 corners determine it; below 8 nothing checks it
+MIN_CORNERS = 6  # twelve numbers for the six of a pose: as many again to check it by
 
 Refine: TypeAlias = Literal["none", "subpix", "model"]
 Progress: TypeAlias = Callable[[int, int, View], None]

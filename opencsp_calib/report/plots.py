@@ -79,7 +79,7 @@ def residual_histogram(calibration: Calibration) -> "Figure":
     for axes, values, name in zip(panels, residuals.T, "xy", strict=True):
         sigma = float(values.std()) or 1.0
         edges = np.linspace(-4, 4, 61) * sigma
-        axes.hist(values, edges, color=ACCENT)
+        axes.hist(values, edges.tolist(), color=ACCENT)
         expected = (
             len(values) * (edges[1] - edges[0]) / (sigma * np.sqrt(2 * np.pi)) * np.exp(-0.5 * (edges / sigma) ** 2)
         )
