@@ -24,6 +24,7 @@ from opencsp_calib.errors import InputError
 __all__ = [
     "Alignment",
     "SigmaMap",
+    "board_ranges",
     "projection_covariance",
     "projection_sigma",
     "ray_sigma",

@@ -39,6 +39,7 @@ __all__ = [
     "with_uncertainty",
 ]
 
+UNKNOWN = {"undetermined", "uncertainty-unknown"}
 MIN_VIEWS = 3  # with two views, leaving one out leaves nothing to compare
 
 
@@ -70,12 +71,16 @@ class Influence:
 def with_uncertainty(calibration: Calibration) -> Calibration:
     """The calibration with its covariances filled in, and with what there is to say about them.
 
+    One whose honest covariance is known, or is known not to be, is returned as it is.
+
     Returns
     -------
     Calibration
         `covariance` is the honest one. Both are NaN, and a `Problem` says so, where the views do not determine the
         camera, or would not without one of them. A view on which the result hangs is named in another.
     """
+    if np.isfinite(calibration.covariance).all() or {p.code for p in calibration.problems} & UNKNOWN:
+        return calibration
     try:
         equations = normal_equations(calibration)
         if equations.dof <= 0:
