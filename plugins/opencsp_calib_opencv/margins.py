@@ -13,9 +13,10 @@ from opencsp_calib_opencv.rings import sample
 
 __all__ = ["sides_seen"]
 
-BEYOND = 0.3  # of a square: where the margin is looked at; margins are seldom narrower than half a square
-NEAR_WHITE = 0.65  # of the way from dark to white that counts as white
-FEWEST_TELLING = 3  # places where the board, if it went on, would be dark
+AT = 0.18  # of a square: from the line where the outer squares should end, dark this far inside, white this far outside
+BEYOND = 0.35  # of a square: how far outside it is still white; margins are seldom narrower than half a square
+NEAR = 0.3  # of the contrast, that counts as dark or white still
+FEWEST_TELLING = 3  # dark squares that end where they should, while the board would go on
 
 
 def sides_seen(grey: NDArray[np.float32], grid: Floats) -> tuple[bool, bool, bool, bool]:
@@ -33,24 +34,25 @@ def _first_row_is_last(grey: NDArray[np.float32], grid: Floats) -> bool:
     whole = known(second)[:-1] & known(second)[1:] & known(outer)[:-1] & known(outer)[1:]
     if whole.sum() < 2 * FEWEST_TELLING:
         return False
-    inside = _levels(grey, _middles(first, second, 0.5)[whole])
-    squares = _levels(grey, _middles(outer, first, 0.5)[whole])
-    margin_pixels = _middles(outer, first, -BEYOND)[whole]
-    margin = _levels(grey, margin_pixels)
+    inside, squares = (
+        _levels(grey, _between(upper, lower, 0.5)[whole]) for upper, lower in ((second, first), (first, outer))
+    )
     dark, white = np.minimum(inside, squares), np.maximum(inside, squares)
     middle = (dark.mean() + white.mean()) / 2
-    alternating = ((inside < middle) != (squares < middle)).all()
-    telling = inside < middle
-    white_beyond = margin > dark + NEAR_WHITE * (white - dark)
-    return bool(
-        alternating and telling.sum() >= FEWEST_TELLING and white_beyond.all() and _within(grey, margin_pixels).all()
-    )
+    telling = squares < middle  # where the next square outwards would be white, all is as if the board ended
+    if telling.sum() < FEWEST_TELLING or ((inside < middle) == telling).any():
+        return False
+    ends = [_between(first, outer, 1 + beyond)[whole] for beyond in (-AT, AT, BEYOND)]
+    nearest_to_white = [(_levels(grey, end) - dark) / (white - dark) for end in ends]
+    still_dark = nearest_to_white[0][telling] < NEAR
+    white_beyond = np.abs(np.array(nearest_to_white[1:]) - 1) < NEAR
+    return bool(still_dark.all() and white_beyond.all() and _within(grey, ends[-1]).all())
 
 
-def _middles(upper: Pixels, lower: Pixels, down: float) -> Pixels:
-    """(n - 1, 2) middles between neighbouring columns, `down` of the way from the upper to the lower row."""
-    line = upper + down * (lower - upper)
-    return np.asarray((line[:-1] + line[1:]) / 2)
+def _between(line: Pixels, next_line: Pixels, part: float) -> Pixels:
+    """(n - 1, 2) in the middle of each column of squares, so far from one line to the next."""
+    moved = line + part * (next_line - line)
+    return np.asarray((moved[:-1] + moved[1:]) / 2)
 
 
 def _levels(grey: NDArray[np.float32], pixels: Pixels) -> Floats:

@@ -13,8 +13,9 @@ A grid can be read from each of its four sides. Of these readings a photograph s
 A grid that can be placed in two ways that differ is not placed at all.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +48,21 @@ class Placed:
 
 @dataclass(frozen=True, eq=False)
 class _Reading:
-    turns: int
+    """One way to read a grid.
+
+    Parameters
+    ----------
+    ids : (m, n)
+        Of the grid's corners, as it lies.
+    certain : bool
+        Whether both its place along the rows and along the columns are told by numbers or margins.
+    dark_first : bool
+        Whether the board would have a dark outer square at id 0.
+    roll_deg : float
+    """
+
     ids: Ids
+    certain: bool
     dark_first: bool
     roll_deg: float
 
@@ -64,7 +78,7 @@ def placed(grey: NDArray[np.float32], grid: Floats, board: Board) -> Placed | No
     dark_first = [reading for reading in readings if reading.dark_first]
     readings = dark_first or (readings if whole else [])
     alike = _symmetries(board)
-    if not readings or not all(_same(readings[0].ids, reading.ids, alike) for reading in readings):
+    if not readings or not all(r.certain and _same(readings[0].ids, r.ids, alike) for r in readings):
         return None
     from_deg = -45 if len(readings) == 4 else -135
     ids = min(readings, key=lambda reading: (reading.roll_deg - from_deg) % 360).ids
@@ -74,28 +88,32 @@ def placed(grey: NDArray[np.float32], grid: Floats, board: Board) -> Placed | No
 
 
 def _readings(grey: NDArray[np.float32], grid: Floats, board: Board) -> Iterator[_Reading]:
+    """All readings that nothing in the picture speaks against."""
     columns, rows = board.grid
     all_ids = np.arange(columns * rows).reshape(rows, columns)
     sides = sides_seen(grey, grid)
     for turns in range(4):
         reading = np.rot90(grid, turns)
+        height, width = reading.shape[:2]
         top, right, bottom, left = (sides[(side + turns) % 4] for side in range(4))
-        first_row = _offset(len(reading), rows, top, bottom)
-        first_column = _offset(reading.shape[1], columns, left, right)
-        if first_row is None or first_column is None:
-            continue
-        ids = all_ids[first_row : first_row + len(reading), first_column : first_column + reading.shape[1]]
-        dark = _begins_dark(grey, reading) == ((first_row + first_column) % 2 == 0)
-        yield _Reading(turns, np.rot90(ids, -turns), dark, _roll_deg(reading))
+        begins_dark, roll_deg = _begins_dark(grey, reading), _roll_deg(reading)
+        first_rows, first_columns = _offsets(height, rows, top, bottom), _offsets(width, columns, left, right)
+        certain = len(first_rows) == len(first_columns) == 1
+        for row, column in product(first_rows, first_columns):
+            ids = all_ids[row : row + height, column : column + width]
+            dark_first = begins_dark == ((row + column) % 2 == 0)
+            yield _Reading(np.rot90(ids, -turns), certain, dark_first, roll_deg)
 
 
-def _offset(found: int, wanted: int, begins: bool, ends: bool) -> int | None:
-    """Which of the board's lines the first one found is; None where it cannot be told, or does not fit."""
+def _offsets(found: int, wanted: int, begins: bool, ends: bool) -> Sequence[int]:
+    """Which of the board's lines the first one found may be, where the board is seen to begin or to end."""
     if found == wanted:
-        return 0
-    if found > wanted or begins == ends:
-        return None
-    return 0 if begins else wanted - found
+        return [0]
+    if found > wanted or (begins and ends):
+        return []
+    if not (begins or ends):
+        return range(wanted - found + 1)
+    return [0] if begins else [wanted - found]
 
 
 def _symmetries(board: Board) -> list[Ids]:

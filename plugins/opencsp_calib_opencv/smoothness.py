@@ -7,9 +7,9 @@ from opencsp_calib_opencv.grid import known, square_height, trimmed
 
 __all__ = ["smooth_part"]
 
-MOST_MISFIT = 0.12  # of the squares' height, and
-MOST_MISFIT_PX = 0.4  # which saddles are good to
-ORDERS = ((80, 5), (24, 3))  # fewest corners, and the order of polynomial that they determine; below, there is none
+MOST_MISFIT_PX = 0.5  # saddles are good to that where a photograph is noisy, and
+MOST_MISFIT = 0.04  # of the squares' height, for boards that are bent and lenses that are strange
+ORDERS = ((150, 7), (80, 5), (24, 3))  # fewest corners for an order of polynomial
 
 
 def smooth_part(grid: Floats) -> Floats:
