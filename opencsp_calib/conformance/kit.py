@@ -60,8 +60,13 @@ class Check:
     runs: bool = True
 
     def __call__(self, provided: Provided) -> None:
-        """Check it."""
-        self.holds(provided, self.setup)
+        """Check it; what it raises where it should not is a broken promise too."""
+        try:
+            self.holds(provided, self.setup)
+        except AssertionError:
+            raise
+        except Exception as error:
+            raise AssertionError(f"it raises {error!r}") from error
 
 
 def promise(kept: object, broken: str) -> None:

@@ -1,19 +1,20 @@
 """Promises of everything that a plugin provides."""
 
+import ast
 import re
-import subprocess
 import sys
+from collections.abc import Iterator
 from functools import cache
-from importlib.util import find_spec
+from importlib.util import find_spec, resolve_name
+from pathlib import Path
 
 from opencsp_calib.conformance.kit import Setup, promise
 from opencsp_calib.interfaces import Provided
 
 __all__ = ["CHECKS"]
 
-PROBE = "import sys, {module}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))"
-CORE = "opencsp_calib.registry, opencsp_calib.solving, opencsp_calib.importing, yaml, defusedxml.ElementTree"
-"""What the core itself loads when plugins are listed, and parsers of text that plugins may load too."""
+LIGHT = {"opencsp_calib", "numpy", "scipy", "pluggy", "typing_extensions", "yaml", "defusedxml", "tomli"}
+"""What the core loads when plugins are listed, and parsers of text: quick to load and always there."""
 
 
 def has_a_name_that_can_be_typed(provided: Provided, setup: Setup) -> None:
@@ -30,32 +31,62 @@ def says_what_is_missing(provided: Provided, setup: Setup) -> None:
 
 
 def loads_no_vendor_when_listed(provided: Provided, setup: Setup) -> None:
-    """Importing its module loads the standard library, opencsp_calib and its own package, and nothing else."""
+    """What its module imports outside of functions is the standard library, the core's and its own package's."""
     module = type(provided).__module__
-    if module == "__main__" or not _importable(module):
-        return  # written on the spot: there is nothing to import
-    asked = _run(PROBE.format(module=module))
-    promise(asked.returncode == 0, f"{module} cannot be imported by itself: {asked.stderr.strip()[-300:]}")
-    own = {module.split(".")[0], "opencsp_calib", "__main__"}
-    loaded = {name for name in asked.stdout.split() if not name.startswith("_")}
-    vendors = sorted(loaded - own - _loaded_by_core() - set(sys.stdlib_module_names))
-    promise(not vendors, f"importing {module} loads {', '.join(vendors)}: import vendors inside functions")
-
-
-@cache
-def _loaded_by_core() -> frozenset[str]:
-    return frozenset(_run(PROBE.format(module=CORE)).stdout.split())
-
-
-def _run(code: str) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-
-
-def _importable(module: str) -> bool:
-    try:
-        return find_spec(module) is not None
-    except (ImportError, ValueError):
-        return False
+    if module.rpartition(".")[2].startswith("test_"):
+        return  # written in a test, which may import what it likes
+    vendors = sorted(_vendors(module, frozenset()))
+    promise(not vendors, f"importing {module} imports {', '.join(vendors)}: do that inside functions")
 
 
 CHECKS = (has_a_name_that_can_be_typed, says_what_is_missing, loads_no_vendor_when_listed)
+
+
+def _vendors(module: str, seen: frozenset[str]) -> set[str]:
+    """What a module, and what it imports of its own package, imports from elsewhere."""
+    own = module.partition(".")[0]
+    found: set[str] = set()
+    for name in _imported(module):
+        top = name.partition(".")[0]
+        if top == own and name not in seen and name != module:
+            found |= _vendors(name, seen | {module})
+        elif top != own and top not in LIGHT and top not in sys.stdlib_module_names:
+            found.add(top)
+    return found
+
+
+@cache
+def _imported(module: str) -> frozenset[str]:
+    """Modules that a module's source imports when it is imported, as dotted names; none where there is no source."""
+    try:
+        spec = find_spec(module)
+    except (ImportError, ValueError):
+        return frozenset()
+    if spec is None or not spec.origin or not spec.origin.endswith(".py"):
+        return frozenset()
+    package = spec.name if spec.submodule_search_locations is not None else spec.parent
+    tree = ast.parse(Path(spec.origin).read_text(encoding="utf-8"))
+    return frozenset(name for statement in _executed(tree) for name in _names(statement, package or ""))
+
+
+def _executed(node: ast.AST) -> Iterator[ast.AST]:
+    """Everything below a node that runs on import: no function bodies, and nothing that only type checkers see."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+            continue
+        yield child
+        yield from _executed(child)
+
+
+def _names(statement: ast.AST, package: str) -> list[str]:
+    if isinstance(statement, ast.Import):
+        return [alias.name for alias in statement.names]
+    if not isinstance(statement, ast.ImportFrom):
+        return []
+    origin = "." * statement.level + (statement.module or "")
+    module = resolve_name(origin, package) if statement.level else origin
+    if module.partition(".")[0] != package.partition(".")[0]:
+        return [module]
+    return [module, *(f"{module}.{alias.name}" for alias in statement.names)]  # a submodule, maybe
