@@ -34,6 +34,7 @@ ENTRY = re.compile(r"^[ \t]*(\w+)[ \t]*:[ \t]*\w*[ \t]*:([^;\n]+);", re.MULTILIN
 POLYNOMIAL = ("Poly1", "Poly2", "Poly3", "Poly4", "Poly5")
 OTHER_CAMERAS = ("Magnification", "Tilt", "Rot", "ImagePlaneDist", "Vx", "Vy", "Vz", "SensorType", "HyperFocus")
 LINES_BETWEEN = ("ParGroup", "DOUBLE", "INT", "STRING")
+AREA_SCAN = ("area_scan_division", "area_scan_polynomial")
 INVERSE = "it corrects what was measured; our models distort what is seen"
 ORDER = unverified("Poly4 and Poly5 are taken in the order that two converters agree on, which was not verified")
 
@@ -61,7 +62,10 @@ class Halcon(FileFormat):
 
 def _imported(fields: Fields) -> Imported:
     size = fields.size("ImageWidth", "ImageHeight")
+    kind = fields.first("CamType", "CameraType")
     others = [key for key in OTHER_CAMERAS if key in fields]
+    if kind is not None and fields.text(kind).strip('"') not in AREA_SCAN:
+        others.append(fields.text(kind))
     if others:
         return not_exactly((f"{', '.join(others)} (not an ordinary area scan camera)",), None, size)
     focus, sx, sy = (fields.positive(key) for key in ("Focus", "Sx", "Sy"))

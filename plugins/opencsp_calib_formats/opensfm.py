@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from opencsp_calib import Camera, Problem
+from opencsp_calib import Camera, InputError, Problem
 from opencsp_calib.arrays import Floats
 from opencsp_calib.atomic import replacing
 from opencsp_calib.importing import as_imported, not_exactly
@@ -68,6 +68,8 @@ class OpenSfM(FileFormat):
 
     def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
         """See `CameraFormat.write`."""
+        if not cameras:
+            raise InputError(f"cannot write {path}: no camera")
         content = {name: _written(camera, path) for name, camera in cameras.items()}
         with replacing(path) as temporary:
             temporary.write_text(json.dumps(content, indent=4) + "\n", encoding="utf-8")

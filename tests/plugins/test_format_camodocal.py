@@ -63,6 +63,12 @@ def test_kannala_brandts_k2_is_opencvs_k1(tmp_path: Path) -> None:
     agree(exact(read(tmp_path, text)).project(directions(80)), expected)
 
 
+def test_kannala_brandt_as_converters_from_kalibr_write_it(tmp_path: Path) -> None:
+    k, m = {"k2": 0.01, "k3": -0.02, "k4": 1e-3, "k5": -2e-4}, {"mu": 400.0, "mv": 401.0, "u0": 502.0, "v0": 398.5}
+    camera = exact(read(tmp_path, yaml("KANNALA_BRANDT", distortion_parameters=k, projection_parameters=m)))
+    np.testing.assert_array_equal(camera.params, [*m.values(), *k.values()])
+
+
 def test_pinhole_full_has_opencvs_eight_coefficients(tmp_path: Path) -> None:
     d = {**RADTAN, "k3": 1e-3, "k4": 0.2, "k5": 0.03, "k6": 1e-3}
     imported = read(tmp_path, yaml("PINHOLE_FULL", distortion_parameters=d, projection_parameters=PINHOLE))

@@ -70,6 +70,13 @@ def test_layout_example(data_dir: Path) -> None:
     assert slope == pytest.approx(8e-3 / 4.5e-6, rel=1e-6)
 
 
+def test_camera_types(tmp_path: Path) -> None:
+    text = HALCON.decode() + 'CamType:camtype: "{}";\n'
+    assert read(tmp_path, text.format("area_scan_division")).project is not None
+    with pytest.raises(NotExactError, match="line_scan_division"):
+        exact(read(tmp_path, text.format("line_scan_division")))
+
+
 @pytest.mark.parametrize("key", ["Magnification", "Tilt", "Vx"])
 def test_other_cameras_are_refused_by_name(tmp_path: Path, key: str) -> None:
     with pytest.raises(NotExactError, match=key):
