@@ -4,7 +4,6 @@ import threading
 from contextlib import contextmanager
 
 import numpy as np
-import pytest
 
 from opencsp_calib.conformance import checks_of
 from opencsp_calib.errors import InputError
@@ -13,6 +12,8 @@ from opencsp_calib.image import Image
 
 def caught(liar, check: str, **setup) -> str:
     """What the check says of the liar; fails where it says nothing."""
+    import pytest
+
     found = {c.name: c for c in checks_of(liar, **setup)}[check]
     with pytest.raises(AssertionError) as said:
         found(liar)
