@@ -60,7 +60,8 @@ class FisheyeModel(LensModel):
     def _undistorted(self, plane: Floats, distortion: Params, tolerance: float) -> Points:
         distorted = np.hypot(plane[:, 0], plane[:, 1])
         limit = self.valid_radius(distortion)
-        theta = inverse_radius(distorted, lambda t: _theta_d(t, distortion), limit)
+        plain = not distortion.any()  # where solvers start: dozens of times, with focal lengths to choose from
+        theta = distorted if plain else inverse_radius(distorted, lambda t: _theta_d(t, distortion), limit)
         with np.errstate(all="ignore"):
             for _ in range(50):
                 error = _theta_d(theta, distortion) - distorted

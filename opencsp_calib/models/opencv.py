@@ -68,6 +68,8 @@ class OpenCVModel(LensModel):
         return bent, by_point, by_coefficients[:, :, : len(distortion)]
 
     def _undistorted(self, plane: Floats, distortion: Params, tolerance: float) -> Points:
+        if not distortion.any():  # where solvers start: dozens of times, with focal lengths to choose from
+            return np.column_stack([plane, np.ones(len(plane))])
         d = _padded(distortion)
         target = tilted(plane, np.asarray(np.linalg.inv(tilt_matrix(d[12], d[13])), dtype=np.float64))
         limit = self.valid_radius(distortion)
