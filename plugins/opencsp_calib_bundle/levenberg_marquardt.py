@@ -16,7 +16,7 @@ from opencsp_calib.normal_equations import NormalEquations, linearise
 from opencsp_calib.schur import factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
 
-__all__ = ["ROUGHLY", "TO_THE_END", "Minimum", "minimise"]
+__all__ = ["FIRST_DAMPING", "FROM_NEARBY", "ROUGHLY", "TO_THE_END", "Minimum", "minimise"]
 
 ROUGHLY = 1e-4
 """Tolerance that leaves less than a hundredth of the residuals' norm to gain: enough between two weightings."""
@@ -26,7 +26,9 @@ EXACT_PX = 1e-11  # where steps change residuals by less than this, it is roundi
 MAX_STEPS = 200
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-4
-LEAST_DAMPING = 1e-12
+FROM_NEARBY = 1e-12
+"""Damping to begin with where the start is almost the minimum: as good as none, which also is the least there is."""
+GROWTH = 10.0  # of the damping after a step that fails, then 20, 40 and so on
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,12 @@ class _Step:
 
 
 def minimise(
-    lens: LensModel, table: CornerTable, start: Estimate, unknowns: Unknowns, tolerance: float = TO_THE_END
+    lens: LensModel,
+    table: CornerTable,
+    start: Estimate,
+    unknowns: Unknowns,
+    tolerance: float = TO_THE_END,
+    damping: float = FIRST_DAMPING,
 ) -> Minimum:
     """The least sum of squared whitened residuals.
 
@@ -68,6 +75,8 @@ def minimise(
     unknowns : Unknowns
     tolerance : float
         It ends after a step that promised to lower the cost by less than this part.
+    damping : float
+        To begin with.
 
     Returns
     -------
@@ -76,7 +85,7 @@ def minimise(
     """
     estimate, equations = start, linearise(lens, table, start, unknowns)
     rounding = EXACT_PX * table.typical_weight * len(table) ** 0.5
-    damping, growth = FIRST_DAMPING, 2.0
+    growth = GROWTH
     for _ in range(MAX_STEPS):
         step = _step(equations, damping)
         there = _after(lens, table, estimate, unknowns, step) if step else None
@@ -90,7 +99,7 @@ def minimise(
         estimate, equations = there
         if damping <= FIRST_DAMPING and step.promised <= max(tolerance * equations.cost, rounding**2):
             return Minimum(estimate, equations, converged=True)
-        damping, growth = max(damping * max(1e-2, 1.0 - (2.0 * kept - 1.0) ** 3), LEAST_DAMPING), 2.0
+        damping, growth = max(damping * max(1e-2, 1.0 - (2.0 * kept - 1.0) ** 3), FROM_NEARBY), GROWTH
     return Minimum(estimate, equations, converged=False)
 
 

@@ -22,25 +22,25 @@ MEDIAN_LENGTH = 1.17741  # of vectors of two normal errors, in standard deviatio
 SMALLEST_PX = 1e-6  # errors below are of no interest, even where all others are smaller
 
 
-def weights(table: CornerTable, residuals: Floats) -> Floats:
-    """(N,) factors for whitened residuals by Cauchy's loss, from residuals (N, 2) px; 0 where a corner has no image."""
-    return np.asarray(1.0 / np.sqrt(1.0 + (_in_scales(table, residuals) / CAUCHY) ** 2))
+def weights(table: CornerTable, residuals: Floats) -> tuple[Floats, float]:
+    """(N,) factors for whitened residuals by Cauchy's loss, from residuals (N, 2) px, and the scale of the set."""
+    lengths, scales, scale = _scaled(table, residuals)
+    return 1.0 / np.sqrt(1.0 + (lengths / (CAUCHY * scales)) ** 2), scale
 
 
 def outlying(table: CornerTable, residuals: Floats) -> Mask:
     """(N,) which corners lie beyond the limit, from residuals (N, 2) px; all that have no image do."""
-    return np.asarray(_in_scales(table, residuals) > LIMIT)
+    lengths, scales, _ = _scaled(table, residuals)
+    return lengths > LIMIT * scales
 
 
-def _in_scales(table: CornerTable, residuals: Floats) -> Floats:
-    """(N,) length of the whitened residuals in the larger of the set's and the view's scale."""
-    smallest = np.full(len(table), SMALLEST_PX)
+def _scaled(table: CornerTable, residuals: Floats) -> tuple[Floats, Floats, float]:
+    """(N,) lengths of the whitened residuals, (N,) the larger of the set's and the view's scale, and the set's."""
+    smallest = SMALLEST_PX * table.typical_weight
     if table.whitening is not None:
         residuals = (table.whitening @ residuals[:, :, None])[:, :, 0]
-        smallest = SMALLEST_PX * table.whitening[:, [0, 1], [0, 1]].max(axis=1)
     lengths = np.hypot(residuals[:, 0], residuals[:, 1])
     lengths[np.isnan(lengths)] = np.inf
-    of_views = np.array([np.median(part) for part in np.split(lengths, table.first[1:-1])])
-    scale = np.maximum(np.median(lengths), of_views)[table.view] / MEDIAN_LENGTH
-    with np.errstate(invalid="ignore"):
-        return np.where(np.isinf(lengths), np.inf, lengths / np.maximum(scale, smallest))
+    scale = max(float(np.median(lengths)) / MEDIAN_LENGTH, smallest)
+    of_views = np.array([np.median(part) for part in np.split(lengths, table.first[1:-1])]) / MEDIAN_LENGTH
+    return lengths, np.maximum(scale, of_views)[table.view], scale

@@ -116,7 +116,7 @@ def _of_board(calibration: Calibration) -> tuple[Problem, ...]:
 
 
 def _of_aspect(calibration: Calibration) -> tuple[Problem, ...]:
-    if calibration.options.board_shape != "free" or calibration.options.pixel_aspect is not None:
+    if calibration.options.board_shape == "flat" or calibration.options.pixel_aspect is not None:
         return ()
     spread = roll_spread_deg(calibration.cam_from_board)
     if spread > TURNED_DEG:
