@@ -9,6 +9,7 @@ from itertools import islice
 from typing import Literal, TypeAlias
 
 from opencsp_calib.board import Board
+from opencsp_calib.corners import prepare
 from opencsp_calib.corners import refine as refine_by_model
 from opencsp_calib.detection import Detection, Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
@@ -73,6 +74,8 @@ def look_at(
     """
     if refine is None:
         refine = "model" if detector.feature == "corner" else "none"
+    if refine == "model":
+        prepare()  # loads the compiled fit while the first images are read
 
     def look(file: ImageFile) -> Look:
         return _look(file, board, detector, refine)

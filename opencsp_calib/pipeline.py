@@ -176,7 +176,18 @@ def solve(
         solved,
         camera=replace(solved.camera, name=name),
         record=record or {},
-        provenance={**_versions(), **(provenance or {})},
+        provenance={
+            **_versions(),
+            "asked": {
+                "model": model,
+                "solver": solver,
+                "board_shape": board_shape,
+                "pixel_aspect": pixel_aspect,
+                "weights": weights,
+                "robust": robust,
+            },
+            **(provenance or {}),
+        },
     )
 
 

@@ -205,7 +205,8 @@ def test_help_and_version_are_quick_and_quiet() -> None:
         result = subprocess.run(
             [sys.executable, "-m", "opencsp_calib", flag], capture_output=True, text=True, check=True
         )
-        assert "opencsp-calib" in result.stdout
+        assert result.stdout
+        assert result.stderr == ""
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------
@@ -269,9 +270,13 @@ def test_a_wrong_board_says_how_it_is_written(spec: str, words: str, photographs
     assert any(word in line for word in words.split("|")), line
 
 
-def test_swapped_columns_and_rows_are_said(photographs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    line = complaint(capsys, "calibrate", photographs, "--board", "checkerboard:6x9:30mm")
-    assert "9x6" in line
+def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, capsys) -> None:
+    """A plain checkerboard of 6x9 is one of 9x6 seen from the side: nothing tells them apart, and nothing needs to."""
+    named = [
+        answer(capsys, "calibrate", photographs, "--board", f"checkerboard:{size}:30mm") for size in ("9x6", "6x9")
+    ]
+    values = [np.array(list(printed["camera"]["params"].values())) for printed in named]
+    np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
 def test_no_board_anywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

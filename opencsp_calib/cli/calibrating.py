@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table
+from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table, say_unused
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
@@ -82,6 +82,7 @@ def calibrate(
     record = _record(note or [], pixel_pitch)
     with detection_progress() as progress:
         observations = pipeline.detect(images, target, jobs=jobs, progress=progress, **finding)
+    say_unused(observations)
     detected = time.perf_counter()
     options |= args.given(guess=args.guess_from(guess))
     options |= {
@@ -124,6 +125,7 @@ def detect(
         found = pipeline.detect(
             images, pipeline.board_from(board), jobs=jobs, progress=progress, detector=detector, refine=refine
         )
+    say_unused(found)
     save_observations(found, output)
     seconds = {"detect": time.perf_counter() - started}
     say(f"{_count(found)}; saved {output}")
@@ -179,15 +181,10 @@ def _as_before(file: Path) -> dict[str, Any]:
         if "Camera" not in content:
             return {}
     before = load_calibration(file)
-    options = before.options
+    asked = before.provenance.get("asked") or {"model": before.camera.model, "solver": before.solver.split()[0]}
     return {
-        "model": before.camera.model,
-        "solver": before.solver.split()[0],
-        "board_shape": options.board_shape,
-        "pixel_aspect": "free" if options.pixel_aspect is None else options.pixel_aspect,
-        "weights": options.weights,
-        "robust": options.robust,
-        "guess": options.guess,
+        **asked,
+        "guess": before.options.guess,
         "name": before.camera.name,
         "record": before.record,
         "provenance": {key: before.provenance[key] for key in ("images",) if key in before.provenance},

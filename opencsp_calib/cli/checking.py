@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from opencsp_calib.cli.console import detection_progress
+from opencsp_calib.cli.console import detection_progress, say_unused
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,4 +22,6 @@ def observed(images: list[str], board: str | None, jobs: int | None = None) -> "
     if board is None:
         raise InputError("photographs need --board SPEC, such as --board checkerboard:18x23:50mm")
     with detection_progress() as progress:
-        return pipeline.detect(images, pipeline.board_from(board), jobs=jobs, progress=progress)
+        observations = pipeline.detect(images, pipeline.board_from(board), jobs=jobs, progress=progress)
+    say_unused(observations)
+    return observations

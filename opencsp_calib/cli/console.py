@@ -10,9 +10,18 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from opencsp_calib.detecting import Progress
-    from opencsp_calib.detection import Problem, View
+    from opencsp_calib.detection import Observations, Problem
 
-__all__ = ["complain", "detection_progress", "print_json", "progress_bar", "say", "say_problems", "say_table"]
+__all__ = [
+    "complain",
+    "detection_progress",
+    "print_json",
+    "progress_bar",
+    "say",
+    "say_problems",
+    "say_table",
+    "say_unused",
+]
 
 
 def say(text: str) -> None:
@@ -65,16 +74,17 @@ def progress_bar(what: str) -> "Iterator[Callable[[int, int], None]]":
 
 @contextmanager
 def detection_progress() -> "Iterator[Progress]":
-    """A progress bar for looking at images, which names each image that cannot be used, and why."""
+    """A progress bar for looking at images."""
     with progress_bar("Finding corners") as advance:
+        yield lambda done, total, _: advance(done, total)
 
-        def update(done: int, total: int, view: "View") -> None:
-            advance(done, total)
-            if view.status != "used":
-                reason = view.problems[-1].message if view.problems else view.detection.reason
-                say(f"{view.image}: {view.status}: {reason}")
 
-        yield update
+def say_unused(observations: "Observations") -> None:
+    """The images that take no part, each with its reason."""
+    for view in observations.views:
+        if view.status != "used":
+            reason = view.problems[-1].message if view.problems else view.detection.reason
+            say(f"{view.image}: {view.status}: {reason}")
 
 
 def _console() -> "Console":

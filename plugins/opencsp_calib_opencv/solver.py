@@ -10,6 +10,7 @@ import numpy as np
 from opencsp_calib import CalibrationFailedError, InputError, Observations, Problem, SolveOptions
 from opencsp_calib.arrays import Floats, Params
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.images import opencv_on_one_thread
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.solving import check_request, finished, remaining_sigmas
@@ -54,7 +55,9 @@ class OpenCVSolver:
         """See `Solver.solve`."""
         check_request(self, observations, model, options)
         engine = _solve_fisheye if model == "opencv_fisheye" else _solve_pinhole
-        calibration = finished(self, observations, model, options, *engine(observations, model, options))
+        with opencv_on_one_thread():  # with more, OpenCV's sums, and so its results, differ from run to run
+            solution = engine(observations, model, options)
+        calibration = finished(self, observations, model, options, *solution)
         remaining = remaining_sigmas(calibration)
         return calibration if remaining < CONVERGED_SIGMAS else calibration.with_problems(_stopped_short(remaining))
 
