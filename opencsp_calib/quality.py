@@ -28,7 +28,9 @@ class ViewQuality:
     tilt_deg : float
         Between the board's normal and the optical axis: 0 is head-on.
     roll_deg : float
-        Of the board's columns direction in the image, -180 to 180.
+        Of the board's x axis in the image, -180 to 180.
+    orientation : 'horizontal' or 'vertical'
+        Whether the board's longer side runs along the image's width or its height.
     range_m : float
         From the camera to the middle of the board.
     area : float
@@ -42,14 +44,10 @@ class ViewQuality:
     rms_px: float
     tilt_deg: float
     roll_deg: float
+    orientation: Literal["horizontal", "vertical"]
     range_m: float
     area: float
     edge_width_px: float
-
-    @property
-    def orientation(self) -> Literal["horizontal", "vertical"]:
-        """Whether the board's columns direction runs along the image's width or its height."""
-        return "horizontal" if abs(np.cos(np.radians(self.roll_deg))) >= np.sqrt(0.5) else "vertical"
 
 
 @dataclass(frozen=True)
@@ -77,6 +75,7 @@ class SetQuality:
 
 def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
     """What each used view is like, in order."""
+    columns, rows = calibration.board.grid
     board_middle = calibration.board.points.mean(axis=0)
     results = []
     views = zip(
@@ -88,6 +87,7 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
     )
     for view, pose, outliers, rms in views:
         matrix = pose.matrix
+        longer = matrix[:, 0] if columns >= rows else matrix[:, 1]
         widths = view.detection.edge_width_px
         results.append(
             ViewQuality(
@@ -96,6 +96,7 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
                 rms_px=float(rms),
                 tilt_deg=float(np.degrees(np.arccos(min(1.0, abs(matrix[2, 2]))))),
                 roll_deg=float(np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0]))),
+                orientation="horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical",
                 range_m=float(np.linalg.norm(pose.transform(board_middle[None])[0])),
                 area=_hull_area(view.detection.pixels) / np.prod(calibration.camera.image_size),
                 edge_width_px=float("nan") if widths is None else float(np.median(widths)),

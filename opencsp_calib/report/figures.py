@@ -22,7 +22,7 @@ STYLE: dict[str, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.titlesize": 10,
-    "svg.fonttype": "none",
+    "svg.fonttype": "path",  # looks the same whatever fonts the reader has
 }
 
 
