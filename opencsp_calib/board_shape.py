@@ -30,7 +30,7 @@ from opencsp_calib.projection_sigma import sigma_map
 from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["Run", "decide", "roll_spread_deg", "solve_with_aspect"]
+__all__ = ["TURNED_DEG", "Run", "decide", "obstacle_to_shape", "roll_spread_deg", "solve_with_aspect"]
 
 Run: TypeAlias = Callable[[Observations, SolveOptions], Calibration]
 
@@ -95,7 +95,7 @@ def decide(observations: Observations, options: SolveOptions, run: Run, *, aspec
         As `run` with the board as given.
     """
     given = run(observations, replace(options, board_shape="flat"))
-    obstacle = _obstacle(observations, given)
+    obstacle = obstacle_to_shape(observations, given)
     if obstacle:
         return given.with_problems(Problem("board-as-given", f"the board was taken as it is given: {obstacle}"))
     shape = replace(options, board_shape="free")
@@ -167,7 +167,7 @@ def _assumed_square(cam_from_board: tuple[Pose, ...]) -> tuple[Problem, ...]:
     return (Problem("square-pixels-assumed", message),)
 
 
-def _obstacle(observations: Observations, given: Calibration) -> str:
+def obstacle_to_shape(observations: Observations, given: Calibration) -> str:
     """Why the shape cannot, or need not, be solved for; empty if nothing stands in the way."""
     board, views = observations.board, len(given.cam_from_board)
     if not np.array_equal(board.points, board.nominal_points):

@@ -25,6 +25,7 @@ __all__ = [
     "Alignment",
     "SigmaMap",
     "board_ranges",
+    "camera_sigma_map",
     "projection_covariance",
     "projection_sigma",
     "ray_sigma",
@@ -158,12 +159,19 @@ def sigma_map(
     covariance: Matrix | None = None,
 ) -> SigmaMap:
     """Standard deviations over the image, on a grid of columns and rows; see `projection_covariance`."""
-    pixels = pixel_grid(calibration.camera.image_size, grid)
-    flat = pixels.reshape(-1, 2)
-    sigma_px = projection_sigma(calibration, flat, range_m, covariance=covariance)
-    sigma_rad = ray_sigma(calibration, flat, range_m, covariance=covariance)
-    shape = pixels.shape[:2]
-    return SigmaMap(pixels, sigma_px.reshape(shape), sigma_rad.reshape(shape), range_m)
+    covariance = calibration.covariance if covariance is None else covariance
+    return camera_sigma_map(calibration.camera, covariance, range_m, grid=grid)
+
+
+def camera_sigma_map(
+    camera: Camera, covariance: Matrix, range_m: float | None = None, *, grid: tuple[int, int] = GRID
+) -> SigmaMap:
+    """The same for a camera of which nothing but the parameters and their covariance (P, P) is known."""
+    pixels = pixel_grid(camera.image_size, grid)
+    jacobian, by_angle = _at(camera, pixels.reshape(-1, 2), range_m)
+    sigma_px = _length(_propagated(jacobian, covariance))
+    sigma_rad = _length(_propagated(np.asarray(np.linalg.solve(by_angle, jacobian)), covariance))
+    return SigmaMap(pixels, sigma_px.reshape(pixels.shape[:2]), sigma_rad.reshape(pixels.shape[:2]), range_m)
 
 
 def sigma_over_range(

@@ -1,0 +1,271 @@
+"""Whether a calibration can be believed: solver against solver, half against half, model against model.
+
+All on the same observations, without the corners that the calibration left out as outliers. Solvers are compared like
+with like: the board as solved held fixed, equal weights, nothing robust, so that there is one right answer.
+"""
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any, Literal
+
+import numpy as np
+
+from opencsp_calib.arrays import Mask
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.compare import Difference, compare
+from opencsp_calib.detection import Observations
+from opencsp_calib.errors import InputError
+from opencsp_calib.interfaces import Solver
+from opencsp_calib.options import SolveOptions
+from opencsp_calib.projection_sigma import sigma_map
+from opencsp_calib.resampling import known_corners
+from opencsp_calib.trials import LADDER, Trials
+from opencsp_calib.uncertainty import student_factor
+
+__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "Pair", "SolverResult", "Validation", "validate"]
+
+AGREE_PX = 1e-3
+"""Solvers of the same problem agree to 1e-4 px or better; a thousandth cannot come from rounding."""
+LIKE_WITH_LIKE = SolveOptions()
+"""Equal weights, nothing robust; and pixels free: the board being held, their aspect is determined."""
+HELD_OUT_REMARK = (
+    "the rms of held-out views is nearly blind to wrong intrinsics, because each view's pose is fitted to them: it "
+    "tells a wrong board, not a wrong camera"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SolverResult:
+    """What one solver found.
+
+    Parameters
+    ----------
+    name, version : str
+    calibration : Calibration
+    seconds : float
+        Wall time, the way of the data to its engine and back included.
+    """
+
+    name: str
+    version: str
+    calibration: Calibration = field(repr=False)
+    seconds: float
+
+    def as_json(self) -> dict[str, Any]:
+        """Its figures, for programs."""
+        camera = self.calibration.camera
+        params = dict(zip(camera.lens.parameter_names, camera.params.tolist(), strict=True))
+        rms, seconds = self.calibration.rms_px, round(self.seconds, 3)
+        return {"version": self.version, "rms_px": rms, "params": params, "seconds": seconds}
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two solvers' cameras, compared.
+
+    Parameters
+    ----------
+    a, b : str
+        Names of the solvers.
+    difference : Difference
+    """
+
+    a: str
+    b: str
+    difference: Difference = field(repr=False)
+
+    @property
+    def agree(self) -> bool:
+        """Whether they differ nowhere in the image by more than `AGREE_PX`."""
+        return self.difference.worst_px <= AGREE_PX
+
+    def as_json(self) -> dict[str, Any]:
+        """Its figures, for programs."""
+        worst = self.difference.worst_px
+        return {"a": self.a, "b": self.b, "rms_px": self.difference.rms_px, "worst_px": worst, "agree": self.agree}
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """What came of it.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Which was validated, without its outliers.
+    solvers : tuple of SolverResult
+        Those that could run, by name.
+    pairs : tuple of Pair
+        Each of them with each other.
+    trials : Trials
+        Halves, held-out views, lens models, and the other way to take the board.
+    reasons : tuple of str
+        For people, the most important first.
+    """
+
+    calibration: Calibration = field(repr=False)
+    solvers: tuple[SolverResult, ...]
+    pairs: tuple[Pair, ...]
+    trials: Trials
+    reasons: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Literal["agree", "disagree"]:
+        """Of the solvers."""
+        return "agree" if all(pair.agree for pair in self.pairs) else "disagree"
+
+    @property
+    def predicted_px(self) -> float:
+        """The median difference of halves that the honest sigma predicts; NaN where it is not known."""
+        return _predicted_halves_px(self.trials)
+
+    def as_json(self) -> dict[str, Any]:
+        """What ``validate --json`` prints; what is not known is null."""
+        own, other = self.trials.own, self.trials.other_board
+        halves = own.halves.difference if own else None
+        return {
+            "solvers": {result.name: result.as_json() for result in self.solvers},
+            "differences": [pair.as_json() for pair in self.pairs],
+            "halves": {
+                "median_px": halves.median_px if halves else None,
+                "worst_px": halves.worst_px if halves else None,
+                "predicted_px": self.predicted_px if np.isfinite(self.predicted_px) else None,
+            },
+            "held_out": {"rms_px": own.held_out.rms_px if own else None},
+            "models": [trial.as_json() for trial in (*self.trials.models, *([other] if other else []))],
+            "verdict": self.verdict,
+            "reasons": list(self.reasons),
+        }
+
+
+def validate(calibration: Calibration, solvers: Mapping[str, Solver], *, models: Sequence[str] = LADDER) -> Validation:
+    """Put a calibration to every test there is.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        With its observations; solvers are compared with its board as solved.
+    solvers : mapping of str to Solver
+        By name. One that is missing, not able, or fails gives a line among the reasons.
+    models : sequence of str
+        Lens models to try, from the simplest to the richest.
+    """
+    calibration = _without_outliers(calibration)
+    results, left_out = _all_solved(calibration, solvers)
+    pairs = tuple(
+        Pair(a.name, b.name, compare(a.calibration.camera, b.calibration.camera)) for a, b in combinations(results, 2)
+    )
+    engine = _engine(calibration, solvers)
+    trials = Trials.of(calibration, engine, models) if engine else Trials(left_out=("no solver here can repeat it",))
+    reasons = (*_of_solvers(pairs), *left_out, *_of_halves(trials), *_of_models(trials), *_of_board(trials))
+    return Validation(calibration, results, pairs, trials, (*reasons, *trials.left_out))
+
+
+def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tuple[tuple[SolverResult, ...], list[str]]:
+    """By every solver that can, the board as solved held fixed; and why the others could not."""
+    observations = _of_known_corners(calibration)
+    results, left_out = [], []
+    for name, solver in sorted(solvers.items()):
+        begin = time.perf_counter()
+        try:
+            missing = solver.missing()
+            if missing:
+                raise InputError(missing)
+            found = solver.solve(observations, calibration.camera.model, LIKE_WITH_LIKE)
+            results.append(SolverResult(name, solver.version(), found, time.perf_counter() - begin))
+        except Exception as error:  # a stranger's code: whatever it does must not stop ours
+            left_out.append(f"the solver {name} was left out: {error}")
+    return tuple(results), left_out
+
+
+def _engine(calibration: Calibration, solvers: Mapping[str, Solver]) -> Solver | None:
+    """The solver that made the calibration; where it is not here, the first that can do the same."""
+    own = calibration.solver.split(" ")[0]
+    for _, solver in sorted(solvers.items(), key=lambda item: (item[0] != own, item[0])):
+        able = calibration.camera.model in solver.models and calibration.options.asked <= solver.abilities
+        if able and solver.missing() is None:
+            return solver
+    return None
+
+
+def _without_outliers(calibration: Calibration) -> Calibration:
+    """The same, as if the corners that it left out had never been seen."""
+    kept = [~mask for mask in calibration.outliers]
+    return replace(
+        calibration,
+        observations=_keeping(calibration.observations, kept),
+        residuals=tuple(residuals[mask] for residuals, mask in zip(calibration.residuals, kept, strict=True)),
+        outliers=tuple(np.zeros(int(mask.sum()), dtype=np.bool_) for mask in kept),
+    )
+
+
+def _of_known_corners(calibration: Calibration) -> Observations:
+    """Of the board as solved, without corners that were not solved for."""
+    known = known_corners(calibration)
+    observations = calibration.observations.with_board(calibration.board)
+    return _keeping(observations, [known[detection.ids] for detection in observations.detections])
+
+
+def _keeping(observations: Observations, masks: Sequence[Mask]) -> Observations:
+    """Only some corners of each used view."""
+    kept = dict(zip((view.image for view in observations.used), masks, strict=True))
+    views = tuple(
+        replace(view, detection=view.detection.keeping(kept[view.image])) if view.image in kept else view
+        for view in observations.views
+    )
+    return replace(observations, views=views)
+
+
+def _of_solvers(pairs: Sequence[Pair]) -> tuple[str, ...]:
+    if not pairs:
+        return ("fewer than two solvers could run: there was nothing to compare; install another",)
+    apart = [pair for pair in pairs if not pair.agree]
+    if not apart:
+        worst = max(pair.difference.worst_px for pair in pairs)
+        return (f"all solvers agree: they differ nowhere in the image by more than {worst:.1g} px",)
+    return tuple(
+        f"{pair.a} and {pair.b} differ by up to {pair.difference.worst_px:.2g} px in the image, more than {AGREE_PX:g}"
+        for pair in apart
+    )
+
+
+def _of_halves(trials: Trials) -> tuple[str, ...]:
+    if trials.own is None:
+        return ()
+    halves, predicted = trials.own.halves.difference, _predicted_halves_px(trials)
+    figures = f"{halves.median_px:.2g} px median, {halves.worst_px:.2g} px at worst; {predicted:.2g} px are predicted"
+    if halves.median_px > student_factor(len(trials.own.calibration.cam_from_board)) * predicted:
+        return (f"odd and even views disagree by more than the stated sigmas explain: {figures}", HELD_OUT_REMARK)
+    return (f"odd and even views agree: {figures}", HELD_OUT_REMARK)
+
+
+def _predicted_halves_px(trials: Trials) -> float:
+    """Each half has half of the views, so twice the variance; their difference has twice that again."""
+    return 2.0 * float(np.nanmedian(sigma_map(trials.own.calibration).sigma_px)) if trials.own else float("nan")
+
+
+def _of_models(trials: Trials) -> tuple[str, ...]:
+    best = next((trial for trial in trials.models if trial.supported), None)
+    if best is None or len(trials.models) < 2:
+        return ()
+    lines = [f"of the lens models {', '.join(t.model for t in trials.models)} the data support {best.model}"]
+    if trials.own and not trials.own.supported:
+        signs = "; ".join(trials.own.signs) or f"{best.model} explains unseen views better"
+        lines.append(f"the calibration's own model is {trials.own.model}: {signs}")
+    return tuple(lines)
+
+
+def _of_board(trials: Trials) -> tuple[str, ...]:
+    if trials.own is None or trials.other_board is None:
+        return ()
+    flat, shaped = sorted((trials.own, trials.other_board), key=lambda trial: trial.board_shape != "flat")
+    apart = compare(flat.calibration.camera, shaped.calibration.camera)
+    line = (
+        f"solving for the board's shape moves the camera by {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} at worst); "
+        f"halves then differ by {shaped.halves.difference.median_px:.2g} px median, with the board as given by "
+        f"{flat.halves.difference.median_px:.2g} px; held-out rms {shaped.held_out.rms_px:.3g} and "
+        f"{flat.held_out.rms_px:.3g} px"
+    )
+    return (line,)
