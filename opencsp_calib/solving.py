@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Mask, Params, Points
 from opencsp_calib.board import Board
@@ -18,7 +17,7 @@ from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.schur import factorise
 
-__all__ = ["ABILITIES", "check_request", "finished", "laid_on_given", "remaining_sigmas"]
+__all__ = ["ABILITIES", "check_request", "finished", "remaining_sigmas"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -169,45 +168,6 @@ def remaining_sigmas(calibration: Calibration) -> float:
     if calibration.options.weights == "equal":
         variance = max(variance, SMALLEST_NOISE_PX**2)
     return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
-
-
-def laid_on_given(
-    board: Board, points: Points, rotations: Floats, translations: Floats, solved: Mask
-) -> tuple[Points, Floats, Floats]:
-    """A board as solved, turned, shifted and scaled to the board as given, with poses that show the same.
-
-    Images tell a board's shape up to a similarity: it is chosen so that the corners solved for lie nearest to the
-    given ones, in the sense of least squares (Umeyama 1991). These seven conditions and no more: others bias the rest.
-
-    Parameters
-    ----------
-    board : Board
-        As given.
-    points : (K, 3)
-        As solved, in any frame and unit of length.
-    rotations : (V, 3) rad
-        Rotation vectors, of that frame to the camera.
-    translations : (V, 3)
-        In that unit.
-    solved : (K,) bool
-        Which points count.
-
-    Returns
-    -------
-    points : (K, 3) m
-    rotations : (V, 3) rad
-    translations : (V, 3) m
-    """
-    wanted, found = board.points[solved].mean(axis=0), points[solved].mean(axis=0)
-    left, sizes, right = np.linalg.svd((board.points[solved] - wanted).T @ (points[solved] - found))
-    # never a mirror image, however flat the board: its third direction is weak
-    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])
-    turn = (left * sign) @ right
-    scale = float((sizes * sign).sum() / ((points[solved] - found) ** 2).sum())
-    laid = scale * (points - found) @ turn.T + wanted
-    before = Rotation.from_rotvec(rotations)
-    after = before * Rotation.from_matrix(turn).inv()
-    return laid, after.as_rotvec(), scale * (translations + before.apply(found)) - after.apply(wanted)
 
 
 def _on_one_line(points: Points) -> bool:

@@ -21,7 +21,7 @@ TIERS = (
     "calibration",
     "images pose_fit unknowns schur normal_equations subpix",
     "corner_kernel corner_table corners quality photograph compare uncertainty hdf5 hdf5_calibration opencsp",
-    "drawing board_file synthetic rendering resampling lens_fit board_shape dropping initial judgement",
+    "drawing board_file synthetic rendering resampling lens_fit board_shape dropping free_board initial judgement",
     "summary",
     "interfaces",
     "solving importing hookspecs",

@@ -8,9 +8,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
-from opencsp_calib.arrays import Floats, Points
+from opencsp_calib.arrays import Floats, Mask, Points
+from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
 from opencsp_calib.initial import initial_camera, initial_poses
-from opencsp_calib.solving import check_request, finished, laid_on_given
+from opencsp_calib.solving import check_request, finished
 from opencsp_calib_colmap.cameras import HALF_PIXEL, MODELS, colmap_params, our_params
 
 __all__ = ["ColmapSolver"]
@@ -49,18 +50,20 @@ class ColmapSolver:
         camera = initial_camera(observations, model, options.guess)
         poses = initial_poses(camera, observations)
         unit = float(np.ptp(observations.board.nominal_points, axis=0).max())
-        scene = _scene(pycolmap, observations, camera, poses, unit)
-        _adjust(pycolmap, scene, free=options.board_shape == "free")
+        times = times_seen(observations.board, observations.detections)
+        free = options.board_shape == "free"
+        # of a free point that one view alone sees COLMAP wants to know nothing
+        scene = _scene(pycolmap, observations, camera, poses, unit, times > (1 if free else 0))
+        _adjust(pycolmap, scene, free=free)
         params = our_params(scene.cameras[CAMERA].params)
         rotations, translations = _poses(scene, len(poses))
         board = observations.board
-        if options.board_shape == "free":
-            # a corner seen only once is solved for too, but only to be somewhere on its ray
-            times = np.bincount(np.concatenate([d.ids for d in observations.detections]), minlength=len(board.points))
+        if free:
             points = _points(scene, len(board.points))
             points, rotations, translations = laid_on_given(board, points, rotations, translations, times > 1)
-            points[times == 0] = board.points[times == 0]
-            board = board.with_points(points)
+            points[times < 2] = board.points[times < 2]
+            placed = points, rotations, translations, times == 1
+            board = board.with_points(with_lone_corners(camera.lens, params, observations.detections, *placed))
         else:
             translations = translations * unit
         calibration = finished(self, observations, model, options, params, rotations, translations, board=board)
@@ -69,9 +72,17 @@ class ColmapSolver:
 
 
 def _scene(
-    pycolmap: ModuleType, observations: Observations, camera: Camera, poses: tuple[Pose, ...], unit: float
+    pycolmap: ModuleType,
+    observations: Observations,
+    camera: Camera,
+    poses: tuple[Pose, ...],
+    unit: float,
+    wanted: Mask,
 ) -> Any:
-    """A reconstruction whose point ids are corner ids + 1, image ids view numbers + 1, lengths in units."""
+    """A reconstruction whose point ids are corner ids + 1, image ids view numbers + 1, lengths in units.
+
+    Only the wanted corners (K,) take part.
+    """
     width, height = camera.image_size
     scene = pycolmap.Reconstruction()
     scene.add_camera_with_trivial_rig(
@@ -92,6 +103,8 @@ def _scene(
         cam_from_world = pycolmap.Rigid3d(np.column_stack([pose.matrix, pose.translation / unit]))
         scene.add_image_with_trivial_frame(image, cam_from_world)
         for index, corner in enumerate(detection.ids):
+            if not wanted[corner]:
+                continue
             scene.add_observation(int(corner) + 1, pycolmap.TrackElement(number, index))
     return scene
 

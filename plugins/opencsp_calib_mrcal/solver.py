@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from opencsp_calib import Board, Calibration, CalibrationFailedError, InputError, Observations, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, checked
+from opencsp_calib.free_board import laid_on_given
 from opencsp_calib.initial import initial_camera, initial_poses
-from opencsp_calib.solving import check_request, finished, laid_on_given
+from opencsp_calib.models import lens_model
+from opencsp_calib.solving import check_request, finished
 from opencsp_calib_mrcal.process import missing_mrcal, mrcal_version, run_mrcal
 
 __all__ = ["MrcalSolver"]
@@ -99,7 +101,7 @@ class MrcalSolver:
         if options.robust:
             weights = _answer(solution, "weights", (views, rows, columns)).reshape(views, -1)
             outliers = [w[d.ids] < 0 for w, d in zip(weights, observations.detections, strict=True)]
-        params = _answer(solution, "intrinsics", (None,))
+        params = _answer(solution, "intrinsics", (len(lens_model(model).parameter_names),))
         return finished(
             self, observations, model, options, params, rotations, translations, board=board, outliers=outliers
         )
