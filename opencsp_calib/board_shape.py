@@ -19,7 +19,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.compare import compare
+from opencsp_calib.comparison import compare
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibError, CalibrationFailedError
 from opencsp_calib.flatness import not_flat

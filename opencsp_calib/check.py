@@ -12,7 +12,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import Difference, compare
+from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.pose_fit import pose_residuals
@@ -111,7 +111,9 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
     if camera.image_size != observations.image_size:
         sizes = " but the camera is for ".join(f"{w}x{h}" for w, h in (observations.image_size, camera.image_size))
         raise InputError(f"the photographs are {sizes}: they are not from this camera, or were resized")
-    fresh = with_uncertainty(solve(observations))
+    fresh = solve(observations)
+    if not np.isfinite(fresh.covariance).all():
+        fresh = with_uncertainty(fresh)
     if not np.isfinite(fresh.covariance).all():
         said = fresh.problems[-1].message if fresh.problems else "its uncertainty is not known"
         raise CalibrationFailedError(f"no fresh solution to check against: {said}")

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from opencsp_calib.arrays import Floats, Mask, Matrix, Pixels, Points, Vector
 from opencsp_calib.board import Board
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import frame_jacobian
+from opencsp_calib.comparison import frame_jacobian
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.initial import initial_poses

@@ -18,7 +18,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Matrix, Pixels, Points, checked
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import GRID, frame_jacobian, pixel_grid
+from opencsp_calib.comparison import GRID, frame_jacobian, pixel_grid
 from opencsp_calib.errors import InputError
 
 __all__ = [

@@ -12,7 +12,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Mask
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import Difference, compare
+from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.normal_equations import normal_equations

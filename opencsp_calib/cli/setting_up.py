@@ -11,7 +11,7 @@ from opencsp_calib.cli.console import detection_progress, print_json, progress_b
 if TYPE_CHECKING:
     from opencsp_calib.calibration import Calibration
     from opencsp_calib.camera import Camera
-    from opencsp_calib.compare import Difference
+    from opencsp_calib.comparison import Difference
 
 KINDS = ("boards", "detectors", "solvers", "camera_formats", "image_sources")
 
@@ -57,7 +57,7 @@ def demo(
     import time
 
     from opencsp_calib import pipeline
-    from opencsp_calib.compare import compare
+    from opencsp_calib.comparison import compare
     from opencsp_calib.demo import make_demo
     from opencsp_calib.hdf5_calibration import save_calibration
     from opencsp_calib.judgement import judge

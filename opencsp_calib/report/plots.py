@@ -8,7 +8,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Params, Pixels
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import Difference
+from opencsp_calib.comparison import Difference
 from opencsp_calib.quality import correlations
 from opencsp_calib.report.figures import ACCENT, COLOURS, image_axes, new_figure, save_figure
 

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib.camera import Camera
-from opencsp_calib.compare import compare, frame_jacobian, pixel_grid
+from opencsp_calib.comparison import compare, frame_jacobian, pixel_grid
 from opencsp_calib.errors import InputError
 
 SIZE = (1626, 1236)
