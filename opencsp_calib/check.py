@@ -81,6 +81,24 @@ class Check:
         )
         return (Problem("check-too-weak", message), *self.fresh.problems)
 
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """For people: what the verdict rests on, and what there is to say of the photographs."""
+        blind = [
+            v.image for v, rms in zip(self.fresh.observations.used, self.view_rms_px, strict=True) if np.isnan(rms)
+        ]
+        lines = [
+            f"at {self.range_m:.2f} m the camera differs from a fresh solution by {self.difference.rms_px:.2g} px rms "
+            f"({self.difference.worst_px:.2g} px at worst) over the image; uncertainty explains {self.predicted_px:.2g} px",
+            f"residuals with only poses fitted: median of the views' rms {np.nanmedian(self.view_rms_px):.3g} px, of the "
+            f"fresh solution {np.nanmedian(self.fresh.view_rms_px):.3g} px"
+            if len(blind) < len(self.view_rms_px)
+            else "with this camera no view can be explained at all",
+        ]
+        if blind and len(blind) < len(self.view_rms_px):
+            lines.append(f"with this camera these views cannot be explained at all: {', '.join(blind)}")
+        return (*lines, *(problem.message for problem in self.problems))
+
     def as_json(self) -> dict[str, Any]:
         """What ``check --json`` prints."""
         rms, worst = self.difference.rms_px, self.difference.worst_px

@@ -6,6 +6,7 @@ import shutil
 import stat
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -174,6 +175,34 @@ def test_undistort_writes_images(calibrated: Path, photographs: Path, tmp_path: 
     assert run(["undistort", str(calibrated), str(photographs), "-o", str(tmp_path / "flat")]) == 0
     assert len(list((tmp_path / "flat").iterdir())) == 12
     assert "another folder" in complaint(capsys, "undistort", calibrated, photographs, "-o", photographs)
+
+
+def test_validate_lets_solvers_answer_without_images(calibrated: Path, tmp_path: Path, capsys) -> None:
+    report = tmp_path / "v.html"
+    printed = answer(capsys, "validate", calibrated, "--solvers", "bundle,opencv", "--report", report)
+    assert set(printed) == {"solvers", "differences", "halves", "held_out", "models", "verdict", "reasons"}
+    assert set(printed["solvers"]) == {"bundle", "opencv"}
+    assert set(printed["solvers"]["opencv"]) == {"version", "rms_px", "params", "seconds"}
+    assert set(printed["differences"][0]) == {"a", "b", "rms_px", "worst_px", "agree"}
+    assert printed["differences"][0]["worst_px"] < 1e-4
+    assert set(printed["halves"]) == {"median_px", "worst_px", "predicted_px"}
+    assert printed["verdict"] == "agree"
+    assert "The solvers agree" in report.read_text(encoding="utf-8")
+
+
+def test_check_tells_a_good_camera_from_a_bad_one(
+    small_world: SmallWorld, photographs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small_world.camera.save(tmp_path / "good.h5")
+    printed = answer(capsys, "check", tmp_path / "good.h5", photographs, "--board", SmallWorld.spec)
+    assert set(printed) == {"rms_px", "worst_px", "predicted_px", "verdict"}
+    assert printed["verdict"] == "ok"
+    params = small_world.camera.params.copy()
+    params[:2] *= 1.01
+    replace(small_world.camera, params=params).save(tmp_path / "bad.h5")
+    assert run(["check", str(tmp_path / "bad.h5"), str(photographs), "--board", SmallWorld.spec, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["verdict"] == "wrong"
+    assert "--board SPEC" in complaint(capsys, "check", tmp_path / "good.h5", photographs)
 
 
 @pytest.mark.parametrize("suffix", ["svg", "pdf", "png"])

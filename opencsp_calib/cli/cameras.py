@@ -38,7 +38,7 @@ def show(
     from opencsp_calib.summary import camera_as_json, parameter_lines
 
     name, imported = imported_from(file, camera, from_format, image_size)
-    calibration = _calibration_in(file)
+    calibration = calibration_in(file)
     sigma = calibration.sigma if calibration else None
     record = _record_in(file)
     shown = _exact(imported, name)
@@ -67,7 +67,7 @@ def compare(
 ) -> None:
     """Compare two cameras by what they see: pixels over the image, once their frames are aligned."""
     from opencsp_calib.atomic import check_writable
-    from opencsp_calib.compare import compare as compared
+    from opencsp_calib.comparison import compare as compared
 
     if plot:
         check_writable(plot)
@@ -272,7 +272,7 @@ def _record_in(path: Path) -> dict[str, str]:
         return {}
 
 
-def _calibration_in(path: Path) -> Any:
+def calibration_in(path: Path) -> Any:
     """The calibration in one of our camera files; None in any other."""
     from opencsp_calib.errors import FileFormatError
     from opencsp_calib.hdf5_calibration import load_calibration

@@ -1,23 +1,113 @@
 """The commands that check: validate, check."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated
 
-from opencsp_calib.cli.console import detection_progress, say_unused
-from opencsp_calib.errors import InputError
+import typer
+
+from opencsp_calib.cli import arguments as args
+from opencsp_calib.cli.cameras import CameraFile, calibration_in, camera_in
+from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table, say_unused
+from opencsp_calib.errors import FileFormatError, InputError
 
 if TYPE_CHECKING:
+    from opencsp_calib.calibration import Calibration
     from opencsp_calib.detection import Observations
+    from opencsp_calib.interfaces import Solver
+    from opencsp_calib.validate import Validation
 
-COMMANDS: tuple[Any, ...] = ()
+MAX_SHOWN = 12
 
 
-def observed(images: list[str], board: str | None, jobs: int | None = None) -> "Observations":
-    """What is seen in photographs, or what a camera file or observations file says was seen."""
+def validate(
+    images: Annotated[
+        list[str], typer.Argument(metavar="FILE | IMAGES...", help="A camera or observations file, or photographs.")
+    ],
+    board: args.OptionalBoardSpec = None,
+    solvers: Annotated[str | None, typer.Option(metavar="a,b,c", help="By default all that are installed.")] = None,
+    jobs: args.Jobs = None,
+    report: args.Report = None,
+    json: args.Json = False,
+) -> None:
+    """Let every solver, both halves of the views, and the models in order answer the same question."""
+    from opencsp_calib.atomic import check_writable
+    from opencsp_calib.report import write_validation
+    from opencsp_calib.validate import validate as validated
+
+    if report:
+        check_writable(report)
+    engines = _chosen(solvers)
+    found = validated(_calibration(images, board, jobs), engines)
+    _say_validation(found)
+    if report:
+        write_validation(found, report)
+        say(f"report saved: {report}")
+    if json:
+        print_json(found.as_json())
+    if found.verdict == "disagree":
+        raise typer.Exit(1)
+
+
+def check(
+    camera: CameraFile,
+    images: args.Images,
+    board: args.OptionalBoardSpec = None,
+    jobs: args.Jobs = None,
+    json: args.Json = False,
+) -> None:
+    """Check whether a camera is still good for photographs it has not seen."""
+    from opencsp_calib import pipeline
+    from opencsp_calib.check import check as checked
+
+    known = camera_in(camera)
+    observations = _observed(images, board, jobs)
+    calibration = calibration_in(camera)
+    covariance = calibration.covariance if calibration else None
+    found = checked(known, observations, lambda views: pipeline.solve(views, known.model), covariance=covariance)
+    say(f"{known.name}: {found.verdict}")
+    say(
+        f"at {found.range_m:.2f} m it differs from a fresh calibration by {found.difference.rms_px:.3g} px rms, "
+        f"{found.difference.worst_px:.3g} px at worst; {found.predicted_px:.3g} px rms is what uncertainty explains"
+    )
+    say_problems(found.problems)
+    if json:
+        print_json(found.as_json())
+    if found.verdict != "ok":
+        raise typer.Exit(1)
+
+
+COMMANDS = (validate, check)
+
+
+def _chosen(names: str | None) -> "dict[str, Solver]":
+    """The solvers named, or all that can run here."""
+    from opencsp_calib.registry import installed
+
+    registry = installed()
+    if names is not None:
+        return {name: registry.solver(name) for name in (part.strip() for part in names.split(",")) if name}
+    return {name: solver for name, solver in sorted(registry.solvers.items()) if solver.missing() is None}
+
+
+def _calibration(images: list[str], board: str | None, jobs: int | None) -> "Calibration":
+    """The one in a camera file; else solved for now."""
+    from opencsp_calib import pipeline
+    from opencsp_calib.hdf5_calibration import load_calibration
+
+    if _is_file(images):
+        try:
+            return load_calibration(images[0])
+        except FileFormatError:  # observations only, or damaged: then the next line says so
+            pass
+    return pipeline.solve(_observed(images, board, jobs))
+
+
+def _observed(images: list[str], board: str | None, jobs: int | None) -> "Observations":
+    """What is seen in photographs, or what a file says was seen."""
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
 
-    if len(images) == 1 and Path(images[0]).suffix.lower() in (".h5", ".hdf5"):
+    if _is_file(images):
         return load_observations(images[0])
     if board is None:
         raise InputError("photographs need --board SPEC, such as --board checkerboard:18x23:50mm")
@@ -25,3 +115,23 @@ def observed(images: list[str], board: str | None, jobs: int | None = None) -> "
         observations = pipeline.detect(images, pipeline.board_from(board), jobs=jobs, progress=progress)
     say_unused(observations)
     return observations
+
+
+def _is_file(images: list[str]) -> bool:
+    return len(images) == 1 and Path(images[0]).suffix.lower() in (".h5", ".hdf5")
+
+
+def _say_validation(found: "Validation") -> None:
+    rows = [
+        (result.name, result.version, f"{result.calibration.rms_px:.4f} px", f"{result.seconds:.2f} s")
+        for result in found.solvers
+    ]
+    say_table(("solver", "version", "rms", "time"), rows)
+    differences = [
+        (f"{pair.a} - {pair.b}", f"{pair.difference.rms_px:.2g} px", f"{pair.difference.worst_px:.2g} px")
+        for pair in found.pairs
+    ]
+    say_table(("difference over the image", "rms", "worst"), differences)
+    say(f"verdict: {found.verdict}")
+    for reason in found.reasons[:MAX_SHOWN]:
+        say(f"- {reason}")

@@ -2,5 +2,6 @@
 
 from opencsp_calib.report.page import write_report
 from opencsp_calib.report.plots import plot_difference
+from opencsp_calib.report.validation_page import write_validation
 
-__all__ = ["plot_difference", "write_report"]
+__all__ = ["plot_difference", "write_report", "write_validation"]

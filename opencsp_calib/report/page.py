@@ -3,16 +3,15 @@
 import json
 import os
 from html import escape
-from importlib.resources import files
 
 import numpy as np
 
-from opencsp_calib.atomic import replacing
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.judgement import Verdict, judge, verdict
 from opencsp_calib.quality import set_quality, view_qualities
 from opencsp_calib.report import plots
 from opencsp_calib.report.board_section import board_section
+from opencsp_calib.report.document import write_document
 from opencsp_calib.report.figures import as_image
 from opencsp_calib.report.html import table
 from opencsp_calib.report.photographs import photographs
@@ -51,16 +50,7 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str], *, befo
         _photographs(calibration),
         _provenance(calibration),
     )
-    style = files("opencsp_calib.report").joinpath("style.css").read_text(encoding="utf-8")
-    page = (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<title>Calibration of {escape(calibration.camera.name)}</title><style>{style}</style></head><body>\n"
-        + "\n".join(section for section in sections if section)
-        + "\n</body></html>\n"
-    )
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+    write_document(f"Calibration of {calibration.camera.name}", sections, path)
 
 
 def _summary(calibration: Calibration) -> str:
