@@ -8,6 +8,7 @@ unknown, which cannot come out negative as the closed form (Zhang 2000) can.
 """
 
 from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -20,9 +21,9 @@ from opencsp_calib.pose import Pose
 
 __all__ = ["initial_camera", "initial_poses"]
 
-FOCAL_LENGTHS = np.geomspace(0.15, 30.0, 30)  # in image sides
-REFINEMENTS = 6  # each divides the step between focal lengths, of 20 %, by 2
-SEARCH_VIEWS = 16  # as many as the search for the focal length looks at
+FOCAL_LENGTHS = np.geomspace(0.15, 30.0, 20)  # in image sides
+REFINEMENTS = 6  # each halves the step between focal lengths, of 32 %
+SEARCH_VIEWS, SEARCH_CORNERS = 12, 40  # as many as the search for the focal length looks at
 CORNERS = 80  # as many as a pose is found from
 
 
@@ -70,7 +71,7 @@ def initial_poses(camera: Camera, observations: Observations) -> tuple[Pose, ...
     tuple of Pose
         ``cam_from_board``, one per used view.
     """
-    search = _PoseSearch(observations.board.points, observations.detections)
+    search = _PoseSearch(observations.board.points, observations.detections, CORNERS)
     rotations, translations = search.poses(camera.lens, camera.params)
     return tuple(Pose.from_matrix(r, t) for r, t in zip(rotations, translations, strict=True))
 
@@ -90,17 +91,17 @@ def _adapted(guess: Camera, image_size: tuple[int, int], lens: LensModel) -> Par
 def _searched(observations: Observations, lens: LensModel, aspect: float) -> Params:
     size = np.array(observations.image_size, dtype=np.float64)
     views = observations.detections
-    few = views[:: -(-len(views) // SEARCH_VIEWS)]
-    search = _PoseSearch(observations.board.points, few)
+    search = _PoseSearch(observations.board.points, views[:: -(-len(views) // SEARCH_VIEWS)], SEARCH_CORNERS)
 
     def params(focal: float) -> Params:
         distortion = np.zeros(len(lens.distortion_names))
         return np.concatenate([[focal, focal * aspect], (size - 1) / 2, distortion])
 
+    @cache
     def misfit(focal: float) -> float:
         return search.misfit(lens, params(focal))
 
-    best = float(min(size.max() * FOCAL_LENGTHS, key=misfit))
+    best = min((float(focal) for focal in size.max() * FOCAL_LENGTHS), key=misfit)
     step = float(FOCAL_LENGTHS[1] / FOCAL_LENGTHS[0])
     for _ in range(REFINEMENTS):
         step = step**0.5
@@ -111,8 +112,8 @@ def _searched(observations: Observations, lens: LensModel, aspect: float) -> Par
 class _PoseSearch:
     """Some corners of every view, with what their poses need that no camera changes."""
 
-    def __init__(self, board: Points, views: Sequence[Detection]) -> None:
-        chosen = [_chosen(len(view)) for view in views]
+    def __init__(self, board: Points, views: Sequence[Detection], corners: int) -> None:
+        chosen = [_chosen(len(view), corners) for view in views]
         self.lengths = np.array([len(c) for c in chosen])
         self.starts = np.concatenate([[0], np.cumsum(self.lengths)[:-1]])
         self.pixels = np.concatenate([view.pixels[c] for view, c in zip(views, chosen, strict=True)])
@@ -152,8 +153,8 @@ class _PoseSearch:
         return squares if np.isfinite(squares) else np.inf
 
 
-def _chosen(count: int) -> Ids:
+def _chosen(count: int, wanted: int) -> Ids:
     """Some of the corners, at random, but always the same: every n-th could be all on one line."""
-    if count <= CORNERS:
+    if count <= wanted:
         return np.arange(count)
-    return np.sort(np.random.default_rng(count).permutation(count)[:CORNERS])
+    return np.sort(np.random.default_rng(count).permutation(count)[:wanted])
