@@ -84,20 +84,23 @@ class Check:
     @property
     def reasons(self) -> tuple[str, ...]:
         """For people: what the verdict rests on, and what there is to say of the photographs."""
+        apart = self.difference
+        off = (
+            f"at {self.range_m:.2f} m the camera is {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} px at worst) off a "
+            f"fresh solution; uncertainty explains {self.predicted_px:.2g} px rms"
+        )
+        return (off, self._of_residuals(), *(problem.message for problem in self.problems))
+
+    def _of_residuals(self) -> str:
         blind = [
             v.image for v, rms in zip(self.fresh.observations.used, self.view_rms_px, strict=True) if np.isnan(rms)
         ]
-        lines = [
-            f"at {self.range_m:.2f} m the camera differs from a fresh solution by {self.difference.rms_px:.2g} px rms "
-            f"({self.difference.worst_px:.2g} px at worst) over the image; uncertainty explains {self.predicted_px:.2g} px",
-            f"residuals with only poses fitted: median of the views' rms {np.nanmedian(self.view_rms_px):.3g} px, of the "
-            f"fresh solution {np.nanmedian(self.fresh.view_rms_px):.3g} px"
-            if len(blind) < len(self.view_rms_px)
-            else "with this camera no view can be explained at all",
-        ]
-        if blind and len(blind) < len(self.view_rms_px):
-            lines.append(f"with this camera these views cannot be explained at all: {', '.join(blind)}")
-        return (*lines, *(problem.message for problem in self.problems))
+        if blind:
+            return f"no pose explains what is seen in {', '.join(blind)} with this camera"
+        here, there = np.median(self.view_rms_px), np.median(self.fresh.view_rms_px)
+        return (
+            f"with only poses fitted, the median view has an rms of {here:.3g} px; in the fresh solution {there:.3g} px"
+        )
 
     def as_json(self) -> dict[str, Any]:
         """What ``check --json`` prints."""
