@@ -7,14 +7,14 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.camera import Camera
 from opencsp_calib.drawing import Drawing, checkerboard_drawing
+from opencsp_calib.drawing.pattern import pattern_of
 from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 from opencsp_calib.pose import Pose
 from opencsp_calib.rendering.blur import pixel_response
 from opencsp_calib.rendering.kernels import light_of
-from opencsp_calib.drawing.pattern import pattern_of
 from opencsp_calib.rendering.scene import Exposure, Scene, Spot, room
-from opencsp_calib.rendering.surface import STEP_PX, look_up
+from opencsp_calib.rendering.surface import look_up
 
 __all__ = ["render"]
 
@@ -73,10 +73,9 @@ def render(
     nodes = look_up(camera, board, pose, border)
     levels = (scene.black + (scene.white - scene.black) * pattern.white) * pattern.sheet
     light, behind, before = _lighting(camera.image_size, border, scene, exposure)
-    grey = light_of(
-        nodes.x, nodes.y, STEP_PX, -border - nodes.first_px, pattern.x_edges, pattern.y_edges, levels, pattern.sheet,
-        light, behind, before, spread,
-    )  # fmt: skip
+    places = (nodes.x, nodes.y, nodes.step_px, -border - nodes.first_px)
+    cells = (pattern.x_edges, pattern.y_edges, levels, pattern.sheet)
+    grey = light_of(*places, *cells, light, behind, before, spread)
     return Image(name, _exposed(grey[border : -border or None, border : -border or None], exposure, rng))
 
 
