@@ -52,7 +52,7 @@ def as_image(figure: "Figure", alternative: str) -> str:
 
     buffer = io.BytesIO()
     with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", dpi=130, metadata={"Date": None})
+        figure.savefig(buffer, format="svg", dpi=130, bbox_inches="tight", metadata={"Date": None})
     data = base64.b64encode(buffer.getvalue()).decode()
     return f'<img class="plot" alt="{html.escape(alternative)}" src="data:image/svg+xml;base64,{data}">'
 
@@ -69,4 +69,4 @@ def save_figure(figure: "Figure", path: str | PathLike[str]) -> None:
     if suffix not in (".png", ".svg", ".pdf"):
         raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {suffix or 'a file without extension'!r}")
     with replacing(path) as temporary:
-        figure.savefig(temporary, format=suffix[1:], dpi=150)
+        figure.savefig(temporary, format=suffix[1:], dpi=150, bbox_inches="tight")
