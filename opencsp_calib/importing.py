@@ -204,7 +204,7 @@ def exact(imported: Imported) -> Camera:
     """
     if imported.obstacles:
         reason = f"not exactly one of our lens models: {'; '.join(imported.obstacles)}"
-        if imported.project is None:
+        if imported.project is None and imported.resize is None:
             raise NotExactError(f"{reason}; and it cannot be fitted")
         raise NotExactError(f"{reason}; --fit MODEL approximates it and states the error ({', '.join(LENS_MODELS)})")
     if imported.camera is None:
@@ -236,9 +236,9 @@ def fitted(
     InputError
         If the image size is not known, or the model cannot show what the image does.
     """
-    if imported.project is None:
+    if imported.project is None and imported.resize is None:
         raise NotExactError(f"cannot be fitted: {'; '.join(imported.obstacles) or 'its projection is not known'}")
-    if imported.image_size is None:
+    if imported.image_size is None or imported.project is None:
         raise InputError("the file does not have the image size; add --image-size WIDTHxHEIGHT")
     found = fit(imported.project, imported.image_size, model, name=name, max_angle=max_angle)
     if not found.worst_px <= accept_error_px:

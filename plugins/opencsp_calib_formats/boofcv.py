@@ -6,12 +6,13 @@ chessboard detector suggests and nothing documents. Source: BoofCV, ``Calibratio
 ``CameraKannalaBrandt.java``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats
+from opencsp_calib.arrays import Floats, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -58,76 +59,73 @@ class BoofCV(FileFormat):
             return {"camera": _imported("camera", fields)}
 
 
+@dataclass(frozen=True)
+class _Pinhole:
+    """Focal lengths and centre in our convention, skew, image size."""
+
+    intrinsics: tuple[float, float, float, float]
+    skew: float
+    size: tuple[int, int]
+
+    @property
+    def obstacles(self) -> tuple[str, ...]:
+        return (f"skew = {self.skew:g} px (our models have none)",) if self.skew else ()
+
+
 def _imported(name: str, fields: Fields) -> Imported:
     kind = fields.text("model")
-    pinhole = fields.fields("pinhole")
-    size = pinhole.size("width", "height")
-    fx, fy, cx, cy = (pinhole.number(key) for key in ("fx", "fy", "cx", "cy"))
-    intrinsics, skew = (fx, fy, cx - 0.5, cy - 0.5), pinhole.number("skew", 0.0)
-    obstacles = (f"skew = {skew:g} px (our models have none)",) if skew else ()
-    common = (name, fields, intrinsics, skew, obstacles, size)
+    values = fields.fields("pinhole")
+    fx, fy, cx, cy = (values.number(key) for key in ("fx", "fy", "cx", "cy"))
+    pinhole = _Pinhole((fx, fy, cx - 0.5, cy - 0.5), values.number("skew", 0.0), values.size("width", "height"))
     if kind == "kannala_brandt":
-        return _kannala_brandt(*common)
-    if kind in ("pinhole", "pinhole_radial_tangential", "omnidirectional_universal"):
-        return _brown(*common)
-    return not_exactly((f"model {kind} (no lens model of ours)",), None, size, (HALF_PIXEL,))
+        return _kannala_brandt(name, fields, pinhole)
+    if kind == "omnidirectional_universal":
+        return _brown(name, fields, pinhole, fields.number("mirror_offset"))
+    if kind in ("pinhole", "pinhole_radial_tangential"):
+        return _brown(name, fields, pinhole, 0.0)
+    return not_exactly((f"model {kind} (no lens model of ours)",), None, pinhole.size, (HALF_PIXEL,))
 
 
-Intrinsics = tuple[float, float, float, float]
-Size = tuple[int, int]
-
-
-def _brown(
-    name: str, fields: Fields, intrinsics: Intrinsics, skew: float, obstacles: tuple[str, ...], size: Size
-) -> Imported:
+def _brown(name: str, fields: Fields, pinhole: _Pinhole, xi: float) -> Imported:
     terms = fields.fields("radial_tangential") if "radial_tangential" in fields else Fields({})
-    radial = [float(k) for k in _coefficients(terms, "radial")]
+    radial = np.trim_zeros(_coefficients(terms, "radial"), "b").tolist()
     t1, t2 = terms.number("t1", 0.0), terms.number("t2", 0.0)
-    xi = fields.number("mirror_offset", 0.0)
+    obstacles = pinhole.obstacles
     if xi:
         obstacles += (f"mirror_offset = {xi:g} (the unified omnidirectional model)",)
-    while len(radial) > 3 and radial[-1] == 0:
-        radial.pop()
     if len(radial) > 3:
         obstacles += (f"{len(radial)} radial terms (opencv models have 3)",)
     if obstacles:
         central = (lambda p: omni(p, xi)) if xi else on_plane
-        return other_camera(
-            name, obstacles, lambda p: brown(central(p), radial, (t1, t2)), intrinsics, size, (HALF_PIXEL,), skew=skew
-        )
+        return _other(name, obstacles, lambda p: brown(central(p), radial, (t1, t2)), pinhole)
     k1, k2, k3 = (*radial, 0.0, 0.0, 0.0)[:3]
     count = 5 if len(radial) == 3 else 4 if "radial_tangential" in fields else 0
-    params = np.array([*intrinsics, k1, k2, t1, t2, k3])[: 4 + count]
-    return as_imported(name, f"opencv{count}" if count else "pinhole", params, size, (HALF_PIXEL,))
+    params = np.array([*pinhole.intrinsics, k1, k2, t1, t2, k3])[: 4 + count]
+    return as_imported(name, f"opencv{count}" if count else "pinhole", params, pinhole.size, (HALF_PIXEL,))
 
 
-def _kannala_brandt(
-    name: str, fields: Fields, intrinsics: Intrinsics, skew: float, obstacles: tuple[str, ...], size: Size
-) -> Imported:
+def _kannala_brandt(name: str, fields: Fields, pinhole: _Pinhole) -> Imported:
     symmetric = _coefficients(fields, "symmetric")
     if len(symmetric) == 0 or not symmetric[0] > 0:
         raise FileFormatError("symmetric is not a list that starts with a positive number")
-    fx, fy, cx, cy = intrinsics
-    intrinsics = (fx * symmetric[0], fy * symmetric[0], cx, cy)
-    k = [float(s) for s in symmetric[1:] / symmetric[0]]
-    if any(_coefficients(fields, key).any() for key in ASYMMETRIC):
-        found = " and ".join(key for key in ASYMMETRIC if _coefficients(fields, key).any())
-        return not_exactly((*obstacles, f"{found} (asymmetric terms)"), None, size, (HALF_PIXEL,))
-    if any(k[4:]):
-        obstacles += (f"{len(symmetric)} symmetric terms (opencv_fisheye has 5)",)
+    scale, k = symmetric[0], np.trim_zeros(symmetric[1:] / symmetric[0], "b").tolist()
+    fx, fy, cx, cy = pinhole.intrinsics
+    scaled = replace(pinhole, intrinsics=(fx * scale, fy * scale, cx, cy), skew=pinhole.skew * scale)
+    obstacles = pinhole.obstacles
+    asymmetric = [key for key in ASYMMETRIC if _coefficients(fields, key).any()]
+    if asymmetric:
+        obstacles += (f"{', '.join(asymmetric)} (asymmetric terms)",)
+        return not_exactly(obstacles, None, pinhole.size, (HALF_PIXEL,))
+    if len(k) > 4:
+        obstacles += (f"{len(k) + 1} symmetric terms (opencv_fisheye has 5)",)
     if obstacles:
-        return other_camera(
-            name,
-            obstacles,
-            lambda p: brown(equidistant(p), k),
-            intrinsics,
-            size,
-            (HALF_PIXEL,),
-            skew=skew * symmetric[0],
-        )
-    return as_imported(
-        name, "opencv_fisheye", np.array([*intrinsics, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]]), size, (HALF_PIXEL,)
-    )
+        return _other(name, obstacles, lambda p: brown(equidistant(p), k), scaled)
+    params = np.array([*scaled.intrinsics, *(*k, 0.0, 0.0, 0.0, 0.0)[:4]])
+    return as_imported(name, "opencv_fisheye", params, pinhole.size, (HALF_PIXEL,))
+
+
+def _other(name: str, obstacles: tuple[str, ...], plane: Callable[[Points], Floats], pinhole: _Pinhole) -> Imported:
+    return other_camera(name, obstacles, plane, pinhole.intrinsics, pinhole.size, (HALF_PIXEL,), skew=pinhole.skew)
 
 
 def _coefficients(fields: Fields, name: str) -> Floats:

@@ -6,8 +6,6 @@ import cv2
 import numpy as np
 import pytest
 from format_truth import agree, directions, opencv, perspective
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from opencsp_calib_formats.metashape import Metashape
 
 from opencsp_calib import Camera, InputError
@@ -179,24 +177,6 @@ def test_chunk_without_any_calibration_is_refused(tmp_path: Path) -> None:
 def test_refused(tmp_path: Path, text: str) -> None:
     with pytest.raises(FileFormatError):
         read(tmp_path, text)
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    model=st.sampled_from(["pinhole", "opencv4", "opencv5", "opencv_fisheye"]),
-    f=st.floats(100, 1e5),
-    aspect=st.floats(0.9, 1.1),
-    centre=st.tuples(st.floats(-100, 5000), st.floats(-100, 5000)),
-    d=st.lists(st.floats(-0.5, 0.5), min_size=5, max_size=5),
-)
-def test_written_and_read_again(tmp_path_factory, model: str, f: float, aspect: float, centre, d) -> None:
-    count = {"pinhole": 0, "opencv4": 4, "opencv5": 5, "opencv_fisheye": 4}[model]
-    camera = Camera("x", model, np.array([f, f * aspect, *centre, *d[:count]]), (4001, 3000))
-    path = tmp_path_factory.mktemp("m") / "lens.xml"
-    Metashape().write({"x": camera}, path)
-    again = exact(Metashape().read(path)["camera"])
-    assert (again.model, again.image_size) == (camera.model, camera.image_size)
-    np.testing.assert_allclose(again.params, camera.params, rtol=1e-12, atol=1e-12)
 
 
 def test_what_it_cannot_carry_is_refused_and_nothing_is_written(tmp_path: Path) -> None:
