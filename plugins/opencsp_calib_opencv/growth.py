@@ -8,7 +8,7 @@ from opencsp_calib.arrays import Floats, Mask, Pixels
 from opencsp_calib_opencv.grid import known, mean_known, padded, predicted, square_height, steps, trimmed
 from opencsp_calib_opencv.rings import look
 
-__all__ = ["grown", "pruned"]
+__all__ = ["belongs", "filled", "grown", "pruned"]
 
 MOST_MISFIT = 0.3  # of the squares' height; perspective itself bends by a tenth, a wrong corner is off by half
 REACH = 0.35  # of the squares' height: how far from its predicted place an overlooked corner is looked for
@@ -45,7 +45,7 @@ def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, longest: int
         if max(grid.shape[:2]) > longest:
             break
         for distance in (1, 2):
-            grid = _joined(grey, grid, tree, distance)
+            grid = trimmed(_joined(grey, padded(grid, distance), tree, distance, RING))
             if known(grid).sum() > size:
                 break
         else:
@@ -53,29 +53,43 @@ def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, longest: int
     return grid
 
 
-def _joined(grey: NDArray[np.float32], grid: Floats, saddles: cKDTree, distance: int) -> Floats:
+def filled(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, ring: float) -> Floats:
+    """With every saddle put in that stands where a corner of the grid is missing, and looks like one.
+
+    `ring` is the radius, as a part of the squares' height, within which nothing but the checkerboard is printed.
+    """
+    tree = cKDTree(saddles)
+    for _ in range(MOST_ROUNDS):
+        fuller = _joined(grey, grid, tree, 1, ring)
+        if known(fuller).sum() == known(grid).sum():
+            break
+        grid = fuller
+    return grid
+
+
+def _joined(grey: NDArray[np.float32], grid: Floats, saddles: cKDTree, distance: int, ring: float) -> Floats:
     """With the saddles that stand where a corner should be, up to so many steps from the known ones."""
-    wider = padded(grid, distance)
-    foretold = wider
+    foretold = grid
     for _ in range(distance):
         foretold = np.where(known(foretold)[..., None], foretold, mean_known(predicted(foretold)))
-    empty = ~known(wider) & known(foretold)
+    empty = ~known(grid) & known(foretold)
     off, nearest = saddles.query(foretold[empty])
     hit = off < REACH * np.nan_to_num(square_height(foretold)[empty])
     tried = np.zeros_like(empty)
     tried[empty] = hit
-    wider[tried] = saddles.data[nearest[hit]]
-    wider[tried & ~belongs(grey, wider)] = np.nan
-    return trimmed(wider)
+    fuller = grid.copy()
+    fuller[tried] = np.asarray(saddles.data)[nearest[hit]]
+    fuller[tried & ~belongs(grey, fuller, ring)] = np.nan
+    return np.asarray(fuller)
 
 
-def belongs(grey: NDArray[np.float32], grid: Floats) -> Mask:
+def belongs(grey: NDArray[np.float32], grid: Floats, ring: float = RING) -> Mask:
     """(m, n) whether there is a corner and it looks like one of this grid, by its edges' directions and its colours."""
     there = known(grid)
     if not there.any():
         return there
     height = square_height(grid)[there]
-    rings = look(grey, grid[there], np.clip(np.nan_to_num(RING * height), SMALLEST_RING_PX, LARGEST_RING_PX))
+    rings = look(grey, grid[there], np.clip(np.nan_to_num(ring * height), SMALLEST_RING_PX, LARGEST_RING_PX))
     row, column = np.nonzero(there)
     swapped = (row + column) % 2 == 1  # the first edge of one corner is the second of the next
     edges = np.where(swapped[:, None], rings.edges[:, ::-1], rings.edges)

@@ -9,26 +9,31 @@ from numpy.typing import NDArray
 from opencsp_calib.arrays import Pixels
 from opencsp_calib.image import Image
 
-__all__ = ["Level", "levels"]
+__all__ = ["Level", "finest_level", "levels"]
 
 FIRST_LEVEL_PX = 600_000  # large enough for 1000 corners, small enough for 10 ms
 LARGEST_LEVEL_PX = 4_500_000  # bounds time and memory for any photograph: a level costs 15 ms and 40 MB a megapixel
 LONGEST_SIDE_PX = 30_000  # OpenCV's `remap` cannot address more than 32767
+SMALLEST_SIDE_PX = 16  # less shows no board
+FACTORS = tuple(2**n for n in range(16))
 SMOOTHING_PX = 1.2  # noise of a twentieth of the contrast must not make or break a corner
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A photograph reduced by averaging blocks of pixels, then smoothed.
+    """A photograph reduced by averaging blocks of pixels.
 
     Parameters
     ----------
-    grey : (height, width) float32
+    sharp : (height, width) float32
         From 0, black, to 1, where the photograph is saturated.
+    grey : (height, width) float32
+        The same, smoothed.
     factor : int
         Side of the blocks.
     """
 
+    sharp: NDArray[np.float32]
     grey: NDArray[np.float32]
     factor: int
 
@@ -36,20 +41,38 @@ class Level:
         """(..., 2) pixels of this level as pixels of the photograph."""
         return (pixels + 0.5) * self.factor - 0.5
 
+    def eight_bit(self, *, inverted: bool = False) -> NDArray[np.uint8]:
+        """Sharp, from 0 to 255, stretched to the range between the darkest and brightest hundredths."""
+        step = max(1, self.sharp.size // 100_000)
+        dark, bright = np.percentile(self.sharp.ravel()[::step], [1, 99])
+        stretched = (self.sharp - dark) * (255 / max(bright - dark, 1e-3))
+        pixels = np.asarray(np.clip(stretched, 0, 255), dtype=np.uint8)
+        return np.invert(pixels) if inverted else pixels
+
 
 def levels(image: Image) -> Iterator[Level]:
     """Reduced photographs, in the order in which it pays to search them: small, finer and finer, then very coarse.
 
     The coarse one at last is for a board that is out of focus; nothing else needs it.
     """
-    area, longest = image.pixels.size, max(image.size)
-    factors = [2**n for n in range(16)]
-    allowed = [f for f in factors if area <= LARGEST_LEVEL_PX * f**2 and longest <= LONGEST_SIDE_PX * f]
-    first = next(f for f in allowed if area <= FIRST_LEVEL_PX * f**2)
+    allowed = _allowed(image)
+    first = next(f for f in allowed if image.pixels.size <= FIRST_LEVEL_PX * f**2)
     finer = [f for f in reversed(allowed) if f <= first]
     for factor in [*finer, 2 * first]:
-        if min(image.size) >= 16 * factor:
+        if min(image.size) >= SMALLEST_SIDE_PX * factor:
             yield reduced(image, factor)
+
+
+def finest_level(image: Image) -> Level | None:
+    """The photograph itself, unless it is too large; None where it is too small to show anything."""
+    factor = _allowed(image)[0]
+    return reduced(image, factor) if min(image.size) >= SMALLEST_SIDE_PX * factor else None
+
+
+def _allowed(image: Image) -> list[int]:
+    """Factors that bound time and memory, finest first."""
+    area, longest = image.pixels.size, max(image.size)
+    return [f for f in FACTORS if area <= LARGEST_LEVEL_PX * f**2 and longest <= LONGEST_SIDE_PX * f]
 
 
 def reduced(image: Image, factor: int) -> Level:
@@ -60,4 +83,4 @@ def reduced(image: Image, factor: int) -> Level:
     whole = image.pixels[: height * factor, : width * factor]
     small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA) if factor > 1 else whole
     grey = small.astype(np.float32) / np.float32(image.white)
-    return Level(cv2.GaussianBlur(grey, (0, 0), SMOOTHING_PX), factor)
+    return Level(grey, cv2.GaussianBlur(grey, (0, 0), SMOOTHING_PX), factor)

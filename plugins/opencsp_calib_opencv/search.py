@@ -4,7 +4,7 @@ from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board
-from opencsp_calib_opencv.grid import known
+from opencsp_calib_opencv.grid import known, trimmed
 from opencsp_calib_opencv.growth import grown, pruned
 from opencsp_calib_opencv.lattice import grids, links
 from opencsp_calib_opencv.levels import Level
@@ -36,7 +36,7 @@ def found_grids(level: Level, board: Board) -> list[Floats]:
         if max(seed.shape) <= MUCH_LONGER * longest:
             grid = pruned(level.grey, seed)
             if _count(grid) >= FEWEST_CORNERS:
-                grid = smooth_part(grown(level.grey, grid, saddles, longest))
+                grid = trimmed(smooth_part(grown(level.grey, grid, saddles, longest)))
         if _count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
             found.append(grid)
     return sorted(found, key=_count, reverse=True)

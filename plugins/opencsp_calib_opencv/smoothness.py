@@ -3,12 +3,13 @@
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask, Matrix
-from opencsp_calib_opencv.grid import known, square_height, trimmed
+from opencsp_calib_opencv.grid import known, square_height
 
 __all__ = ["smooth_part"]
 
 MOST_MISFIT_PX = 0.5  # saddles are good to that where a photograph is noisy, and
 MOST_MISFIT = 0.04  # of the squares' height, for boards that are bent and lenses that are strange
+FEWEST_CORNERS = 6
 ORDERS = ((150, 7), (80, 5), (24, 3))  # fewest corners for an order of polynomial
 
 
@@ -17,16 +18,16 @@ def smooth_part(grid: Floats) -> Floats:
 
     Which corners those are is found by leaving out the worst until the others agree.
     """
-    while known(grid).sum() >= 6:
-        there = known(grid)
+    there = known(grid)
+    while there.sum() >= FEWEST_CORNERS:
+        grid = np.where(there[..., None], grid, np.nan)
         allowed = MOST_MISFIT * square_height(grid)[there] + MOST_MISFIT_PX
         misfit = np.nan_to_num(_misfit(grid, there) / allowed, nan=np.inf)
         worst = misfit.max()
         if worst <= 1:
             return grid
         there[there] = misfit < max(1, 0.6 * worst)
-        grid = trimmed(np.where(there[..., None], grid, np.nan))
-    return grid[:0, :0]
+    return np.full_like(grid, np.nan)
 
 
 def _misfit(grid: Floats, there: Mask) -> Floats:
