@@ -68,17 +68,23 @@ class _Walk:
         return self._dataset(entry, depth)
 
     def _dataset(self, entry: Any, depth: int) -> Any:
-        if entry.size is None or entry.attrs.get("MATLAB_empty", 0):
+        if entry.size is None or self._attribute(entry, "MATLAB_empty"):
             return np.zeros((0, 0))
         if entry.size > MAX_VALUES or entry.external or math.prod(entry.chunks or ()) > MAX_CHUNK:
             return None
-        kind = entry.attrs.get("MATLAB_class", b"")
         if self._h5py.check_ref_dtype(entry.dtype) is not None:
             file = entry.file
             return [self._entry(file[reference], depth + 1) for reference in np.ravel(entry[()]) if reference]
         if entry.dtype.kind not in "iuf":
             return None
         value = np.asarray(entry[()]).T
-        if kind == b"char":
+        if self._attribute(entry, "MATLAB_class") == b"char":
             return "".join(chr(int(code)) for code in value.T.ravel() if 0 <= code < 0x110000)
         return value
+
+    def _attribute(self, entry: Any, name: str) -> Any:
+        """An attribute of fixed size, as MATLAB's are, or None: damaged ones of variable length end the process."""
+        if name not in entry.attrs:
+            return None
+        kind = entry.attrs.get_id(name).dtype
+        return entry.attrs[name] if kind.kind in "iuSb" else None

@@ -23,6 +23,7 @@ from opencsp_calib.importing import not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.mat_file import OBJECTS, is_mat, read_mat
+from opencsp_calib_formats.mat_v5 import Opaque
 from opencsp_calib_formats.opencv_camera import opencv_camera
 from opencsp_calib_formats.reading import FileFormat, naming
 from opencsp_calib_formats.safe_text import head, parse_json, read_text
@@ -61,6 +62,8 @@ class Matlab(FileFormat):
             found: dict[str, Fields] = {}
             for key, fields in _cameras(content, "", 0):
                 found.setdefault(key, fields)
+            if not found:
+                raise FileFormatError("holds no camera parameters or intrinsics of MATLAB's")
             named = _named(_distinct(found), content)
             single = len(named) == 1
             return {key: _imported(path.stem if single else f"{path.stem} {key}", f) for key, f in named.items()}
@@ -75,6 +78,8 @@ def _cameras(value: Any, key: str, depth: int) -> Iterator[tuple[str, Fields]]:
             yield key or "camera", Fields(value, key)
             return
         items: Any = value.items()
+    elif isinstance(value, Opaque):
+        items = [("object", value.content)]
     elif isinstance(value, list):
         items = ((str(index + 1), item) for index, item in enumerate(value))
     else:
@@ -108,7 +113,7 @@ def _named(cameras: Mapping[str, Fields], content: Any) -> dict[str, Fields]:
     inside = [key for key in cameras if key.split(".")[0] == OBJECTS]
     if not inside:
         return dict(cameras)
-    variables = [key for key, value in content.items() if isinstance(value, Mapping) and "s0" in value]
+    variables = [key for key, value in content.items() if isinstance(value, Opaque)]
     variable = variables[0] if len(variables) == 1 else "camera"
     names = {}
     for key, fields in cameras.items():
