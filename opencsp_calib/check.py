@@ -98,9 +98,7 @@ class Check:
         if blind:
             return f"no pose explains what is seen in {', '.join(blind)} with this camera"
         here, there = np.median(self.view_rms_px), np.median(self.fresh.view_rms_px)
-        return (
-            f"with only poses fitted, the median view has an rms of {here:.3g} px; in the fresh solution {there:.3g} px"
-        )
+        return f"with only poses fitted, the median view's rms is {here:.3g} px; in the fresh solution {there:.3g} px"
 
     def as_json(self) -> dict[str, Any]:
         """What ``check --json`` prints."""

@@ -85,14 +85,14 @@ class Alignment:
     grid_jacobian: Floats
 
     @classmethod
-    def at_infinity(cls, camera: Camera) -> "Alignment":
+    def at_infinity(cls, camera: Camera, grid: tuple[int, int] = GRID) -> "Alignment":
         """The frame may turn."""
-        return cls._over(camera, _grid_rays(camera), shifted=False)
+        return cls._over(camera, _grid_rays(camera, grid), shifted=False)
 
     @classmethod
-    def at_range(cls, camera: Camera, *ranges_m: float) -> "Alignment":
+    def at_range(cls, camera: Camera, *ranges_m: float, grid: tuple[int, int] = GRID) -> "Alignment":
         """The frame may turn and shift, by what undoes most at these ranges together."""
-        rays = _grid_rays(camera)
+        rays = _grid_rays(camera, grid)
         return cls._over(camera, np.concatenate([rays * r for r in ranges_m]), shifted=True)
 
     @classmethod
@@ -158,7 +158,10 @@ def sigma_map(
     grid: tuple[int, int] = GRID,
     covariance: Matrix | None = None,
 ) -> SigmaMap:
-    """Standard deviations over the image, on a grid of columns and rows; see `projection_covariance`."""
+    """Standard deviations over the image, on the grid of columns and rows that `compare` takes.
+
+    See `projection_covariance`.
+    """
     covariance = calibration.covariance if covariance is None else covariance
     return camera_sigma_map(calibration.camera, covariance, range_m, grid=grid)
 
@@ -168,7 +171,7 @@ def camera_sigma_map(
 ) -> SigmaMap:
     """The same for a camera of which nothing but the parameters and their covariance (P, P) is known."""
     pixels = pixel_grid(camera.image_size, grid)
-    jacobian, by_angle = _at(camera, pixels.reshape(-1, 2), range_m)
+    jacobian, by_angle = _at(camera, pixels.reshape(-1, 2), range_m, grid)
     sigma_px = _length(_propagated(jacobian, covariance))
     sigma_rad = _length(_propagated(np.asarray(np.linalg.solve(by_angle, jacobian)), covariance))
     return SigmaMap(pixels, sigma_px.reshape(pixels.shape[:2]), sigma_rad.reshape(pixels.shape[:2]), range_m)
@@ -217,9 +220,12 @@ def board_ranges(calibration: Calibration) -> tuple[float, float]:
     return float(min(d.min() for d in distances)), float(max(d.max() for d in distances))
 
 
-def _at(camera: Camera, pixels: Pixels, range_m: float | None) -> tuple[Floats, Floats]:
+def _at(camera: Camera, pixels: Pixels, range_m: float | None, grid: tuple[int, int] = GRID) -> tuple[Floats, Floats]:
     """(N, 2, P) of pixels by the parameters, frame change included; (N, 2, 2) by the ray's direction, px/rad."""
-    alignment = Alignment.at_infinity(camera) if range_m is None else Alignment.at_range(camera, range_m)
+    if range_m is None:
+        alignment = Alignment.at_infinity(camera, grid)
+    else:
+        alignment = Alignment.at_range(camera, range_m, grid=grid)
     rays = camera.unproject(pixels)
     jacobian, by_point = alignment.jacobian(rays * (range_m or 1.0))
     across = np.where(np.abs(rays[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
@@ -229,8 +235,8 @@ def _at(camera: Camera, pixels: Pixels, range_m: float | None) -> tuple[Floats, 
     return jacobian, by_point @ tangents * (range_m or 1.0)
 
 
-def _grid_rays(camera: Camera) -> Points:
-    rays = camera.unproject(pixel_grid(camera.image_size).reshape(-1, 2))
+def _grid_rays(camera: Camera, grid: tuple[int, int] = GRID) -> Points:
+    rays = camera.unproject(pixel_grid(camera.image_size, grid).reshape(-1, 2))
     return rays[np.isfinite(rays).all(axis=1)]
 
 
