@@ -14,7 +14,7 @@ that a view does not see are zero. A pose's unknowns are a small rotation (rad) 
 board's origin, then a shift (m) in the camera's frame; a corner's are its shift (m) in the board's frame.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,9 +24,18 @@ from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
 from opencsp_calib.unknowns import Estimate, Unknowns
 
-__all__ = ["NormalEquations", "linearise", "normal_equations", "residuals", "solvable_corners"]
+__all__ = [
+    "NormalEquations",
+    "linearise",
+    "normal_equations",
+    "residuals",
+    "solvable_corners",
+    "well_conditioned",
+]
 
 CORNER, POSE = 3, 6  # unknowns each
+TOLD_APART = 1e-8  # smallest eigenvalue of the camera's scaled information, poses held, that leaves enough digits
+ROUNDING = 1e-15  # below this an eigenvalue is made of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +137,30 @@ def normal_equations(calibration: Calibration) -> NormalEquations:
     unknowns = Unknowns.of(camera.lens, calibration.observations.board, corners, calibration.options)
     if len(unknowns.corners):
         table = table.keeping(np.isin(table.ids, corners))
-    return linearise(camera.lens, table, Estimate.of(calibration), unknowns)
+    estimate = Estimate.of(calibration)
+    equations = linearise(camera.lens, table, estimate, unknowns)
+    conditioned = well_conditioned(equations)
+    return equations if conditioned is unknowns else linearise(camera.lens, table, estimate, conditioned)
+
+
+def well_conditioned(equations: NormalEquations) -> Unknowns:
+    """The same unknowns, the camera's replaced by combinations of them that images tell apart.
+
+    The coefficients of a rational model can be traded for one another almost without a trace. In the products of
+    their derivatives what is left of one after the others drowns in rounding; combined before they are multiplied,
+    it is known to half the digits. Given back as they are where there is no need.
+    """
+    unknowns = equations.unknowns
+    cameras = unknowns.camera.shape[1]
+    information = equations.shared.sum(axis=0)[:cameras, :cameras]
+    scale = 1.0 / np.sqrt(np.diag(information))
+    if not np.isfinite(scale).all():
+        return unknowns
+    sizes, directions = np.linalg.eigh(information * scale[:, None] * scale)
+    if sizes[0] > TOLD_APART:
+        return unknowns
+    combined = scale[:, None] * directions / np.sqrt(np.maximum(sizes, ROUNDING))
+    return replace(unknowns, camera=unknowns.camera @ combined)
 
 
 def solvable_corners(table: CornerTable, count: int) -> Ids:
@@ -179,7 +211,7 @@ def _rows(
     skipped = CORNER if len(unknowns.corners) else 0
     all_rows = np.empty((len(pixels), 2, skipped + shared + POSE + 1))
     rows = all_rows[:, :, skipped:]
-    rows[:, :, :cameras] = by_params if cameras == len(estimate.params) else by_params @ unknowns.camera
+    rows[:, :, :cameras] = (by_params.reshape(-1, len(unknowns.camera)) @ unknowns.camera).reshape(-1, 2, cameras)
     a, j = turned[:, None, :], by_point
     for axis, (one, two) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[:, :, shared + axis] = a[:, :, one] * j[:, :, two] - a[:, :, two] * j[:, :, one]

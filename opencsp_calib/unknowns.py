@@ -71,7 +71,8 @@ class Unknowns:
     Parameters
     ----------
     camera : (P, Q)
-        How the camera's parameters follow from its unknowns: the identity, or with fy/fx held one column for both.
+        How the camera's parameters follow from its unknowns: the identity; with fy/fx held, one column for both; or
+        combinations that are better told apart.
     warp : (K, 3, W) m
         Shift of each corner of the board per unit of each warp unknown; W = 0 for none.
     corners : (C,) int

@@ -12,22 +12,25 @@ import numpy as np
 from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
-from opencsp_calib.normal_equations import NormalEquations, linearise
+from opencsp_calib.normal_equations import NormalEquations, linearise, well_conditioned
 from opencsp_calib.schur import factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
 
-__all__ = ["FIRST_DAMPING", "FROM_NEARBY", "ROUGHLY", "TO_THE_END", "Minimum", "minimise"]
+__all__ = ["Minimum", "minimise"]
 
 ROUGHLY = 1e-4
 """Tolerance that leaves less than a hundredth of the residuals' norm to gain: enough between two weightings."""
+NEAR = 1e-8
+"""Tolerance as far as unknowns that can hardly be told apart are worth keeping apart."""
 TO_THE_END = 1e-16
 """Tolerance after whose last step nothing but rounding is left: the cosine of residuals and any step is below 1e-9."""
+ENOUGH = 1e-9  # of the cost left to gain, by a promise: good enough where valleys are too narrow and bent to follow
 EXACT_PX = 1e-11  # where steps change residuals by less than this, it is rounding, however small the cost
 MAX_STEPS = 200
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-4
-FROM_NEARBY = 1e-12
-"""Damping to begin with where the start is almost the minimum: as good as none, which also is the least there is."""
+LEAST_DAMPING = 1e-16
+POLISHES = 8  # steps below what the cost can show: more are noise, where unknowns can hardly be told apart
 GROWTH = 10.0  # of the damping after a step that fails, then 20, 40 and so on
 
 
@@ -57,12 +60,7 @@ class _Step:
 
 
 def minimise(
-    lens: LensModel,
-    table: CornerTable,
-    start: Estimate,
-    unknowns: Unknowns,
-    tolerance: float = TO_THE_END,
-    damping: float = FIRST_DAMPING,
+    lens: LensModel, table: CornerTable, start: Estimate, unknowns: Unknowns, *, roughly: bool = False
 ) -> Minimum:
     """The least sum of squared whitened residuals.
 
@@ -71,36 +69,51 @@ def minimise(
     lens : LensModel
     table : CornerTable
     start : Estimate
-        One that sees every corner.
+        One that sees every corner; unless `roughly`, almost the minimum.
     unknowns : Unknowns
-    tolerance : float
-        It ends after a step that promised to lower the cost by less than this part.
-    damping : float
-        To begin with.
+    roughly : bool
+        From further away, and only until steps hardly matter.
 
     Returns
     -------
     Minimum
         Not converged where no step lowers the cost any more, or after too many.
     """
+    if roughly:
+        return _descended(lens, table, start, unknowns, ROUGHLY, FIRST_DAMPING)
+    conditioned = well_conditioned(linearise(lens, table, start, unknowns))
+    if conditioned is unknowns:
+        return _descended(lens, table, start, unknowns, TO_THE_END, LEAST_DAMPING)
+    # along a curved valley damping must hold back each unknown, not combinations of them that are alike
+    near = _descended(lens, table, start, unknowns, NEAR, NEAR)
+    return _descended(lens, table, near.estimate, well_conditioned(near.equations), TO_THE_END, LEAST_DAMPING)
+
+
+def _descended(
+    lens: LensModel, table: CornerTable, start: Estimate, unknowns: Unknowns, tolerance: float, damping: float
+) -> Minimum:
+    """Until a step promises to lower the cost by less than the tolerance, as a part of it."""
     estimate, equations = start, linearise(lens, table, start, unknowns)
     rounding = EXACT_PX * table.typical_weight * len(table) ** 0.5
-    growth = GROWTH
+    growth, fall, polishes = GROWTH, 0.01, 0
     for _ in range(MAX_STEPS):
         step = _step(equations, damping)
         there = _after(lens, table, estimate, unknowns, step) if step else None
         slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
         if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
-            damping, growth = damping * growth, growth * 2.0
+            damping, growth, fall = damping * growth, growth * 2.0, 0.3
             if damping > MAX_DAMPING:
                 break
             continue
         kept = (equations.cost - there[1].cost) / step.promised if step.promised > slack else 1.0
         estimate, equations = there
-        if damping <= FIRST_DAMPING and step.promised <= max(tolerance * equations.cost, rounding**2):
+        polishes += step.promised <= slack
+        done = step.promised <= max(tolerance * equations.cost, rounding**2) or polishes > POLISHES
+        if done and damping <= FIRST_DAMPING:
             return Minimum(estimate, equations, converged=True)
-        damping, growth = max(damping * max(1e-2, 1.0 - (2.0 * kept - 1.0) ** 3), FROM_NEARBY), GROWTH
-    return Minimum(estimate, equations, converged=False)
+        damping, growth = max(damping * max(fall, 1.0 - (2.0 * kept - 1.0) ** 3), LEAST_DAMPING), GROWTH
+    last = _step(equations, LEAST_DAMPING)
+    return Minimum(estimate, equations, converged=last is not None and last.promised <= ENOUGH * equations.cost)
 
 
 def _step(equations: NormalEquations, damping: float) -> _Step | None:

@@ -12,7 +12,7 @@ from opencsp_calib.normal_equations import residuals, solvable_corners
 from opencsp_calib.solving import MIN_CORNERS, check_request, finished
 from opencsp_calib.unknowns import Estimate, Unknowns
 from opencsp_calib_bundle.board_shape import laid_on, with_lone_corners
-from opencsp_calib_bundle.levenberg_marquardt import FIRST_DAMPING, FROM_NEARBY, ROUGHLY, Minimum, minimise
+from opencsp_calib_bundle.levenberg_marquardt import Minimum, minimise
 from opencsp_calib_bundle.robust import outlying, weights
 from opencsp_calib_bundle.start import start, with_deeper_minima
 from opencsp_calib_bundle.verdict import checked_covariance, remarks
@@ -80,11 +80,7 @@ def _roughly(observations: Observations, model: str, options: SolveOptions, tabl
     """An estimate near enough to tell outliers from it, with the board as given."""
     lens = LENS_MODELS[model]
     unknowns = _unknowns(observations, lens, replace(options, board_shape="flat"))
-    estimate = start(observations, model, options)
-    if options.robust:
-        estimate = _weighted(lens, table, estimate, unknowns)
-    else:
-        estimate = minimise(lens, table, estimate, unknowns, ROUGHLY).estimate
+    estimate = _rough_minimum(lens, table, start(observations, model, options), unknowns, options.robust)
     camera = Camera("camera", model, estimate.params, observations.image_size)
     return with_deeper_minima(observations, camera, estimate, table)
 
@@ -95,15 +91,15 @@ def _minimum(
     """The least squares of all corners that are no outliers, and (N,) which are."""
     outliers = np.zeros(len(table), dtype=bool)
     unknowns = _unknowns(observations, lens, options, table)
+    if options.board_shape != "flat":
+        estimate = _rough_minimum(lens, _solvable(table, unknowns), estimate, unknowns, options.robust)
     if options.robust:
-        estimate = _weighted(lens, _solvable(table, unknowns), estimate, unknowns)
         outliers = _outliers(lens, table, estimate, unknowns)
     for _ in range(ROUNDS):
         kept = table.keeping(~outliers)
         _check_counts(observations, kept)
         unknowns = _unknowns(observations, lens, options, kept)
-        damping = FROM_NEARBY if options.robust or options.board_shape == "flat" else FIRST_DAMPING
-        minimum = minimise(lens, _solvable(kept, unknowns), estimate, unknowns, damping=damping)
+        minimum = minimise(lens, _solvable(kept, unknowns), estimate, unknowns)
         estimate, before = minimum.estimate, outliers
         if options.robust:
             outliers = _outliers(lens, table, estimate, unknowns)
@@ -112,14 +108,18 @@ def _minimum(
     return minimum, before
 
 
-def _weighted(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns) -> Estimate:
-    """Roughly minimised by Cauchy's weights, which follow the residuals from round to round."""
+def _rough_minimum(
+    lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, robust: bool
+) -> Estimate:
+    """Near the minimum; if robust, that of Cauchy's weights, which follow the residuals from round to round."""
+    if not robust:
+        return minimise(lens, table, estimate, unknowns, roughly=True).estimate
     last = np.inf
     for _ in range(ROUNDS):
         factors, scale = weights(table, residuals(lens, table, estimate))
         if scale > SETTLED * last:
             break
-        estimate, last = minimise(lens, table.weighted(factors), estimate, unknowns, ROUGHLY).estimate, scale
+        estimate, last = minimise(lens, table.weighted(factors), estimate, unknowns, roughly=True).estimate, scale
     return estimate
 
 
