@@ -16,9 +16,11 @@ ORDERS = ((150, 7), (80, 5), (24, 3))  # fewest corners for an order of polynomi
 def smooth_part(grid: Floats) -> Floats:
     """The grid without the corners that a homography, bent by a polynomial of low order, does not explain.
 
-    Which corners those are is found by leaving out the worst until the others agree.
+    Which corners those are is found by leaving out the worst until the others agree; too few to tell are kept.
     """
     there = known(grid)
+    if there.sum() < FEWEST_CORNERS:
+        return grid
     while there.sum() >= FEWEST_CORNERS:
         grid = np.where(there[..., None], grid, np.nan)
         allowed = MOST_MISFIT * square_height(grid)[there] + MOST_MISFIT_PX
