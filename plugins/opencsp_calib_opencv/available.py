@@ -27,8 +27,6 @@ def _version(folders: list[Path]) -> tuple[int, int] | None:
         if (folder / "version.py").is_file():
             text = (folder / "version.py").read_text(encoding="utf-8")
             match = re.search(r'opencv_version\s*=\s*"(\d+)\.(\d+)', text)
-                r'opencv_version\s*=\s*"(\d+)\.(\d+)', (folder / "version.py").read_text(encoding="utf-8")
-            )
             if match:
                 return int(match[1]), int(match[2])
     return None
