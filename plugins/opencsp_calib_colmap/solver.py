@@ -124,6 +124,7 @@ def _adjust(pycolmap: ModuleType, scene: Any, *, free: bool) -> None:
     solver.function_tolerance = 0.0
     solver.gradient_tolerance = 0.0
     solver.parameter_tolerance = SMALLEST_STEP
+    solver.num_threads = 1  # with more, sums and so results differ from run to run; and it is hardly quicker
     try:
         summary = pycolmap.create_default_bundle_adjuster(options, config, scene).solve()
     except (RuntimeError, ValueError) as error:
