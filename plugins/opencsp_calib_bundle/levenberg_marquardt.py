@@ -79,26 +79,31 @@ def minimise(
     Minimum
         Not converged where no step lowers the cost any more, or after too many.
     """
+    here = linearise(lens, table, start, unknowns)
     if roughly:
-        return _descended(lens, table, start, unknowns, ROUGHLY, FIRST_DAMPING)
-    conditioned = well_conditioned(linearise(lens, table, start, unknowns))
-    if conditioned is unknowns:
-        return _descended(lens, table, start, unknowns, TO_THE_END, LEAST_DAMPING)
+        return _descended(lens, table, start, here, ROUGHLY, FIRST_DAMPING)
+    if well_conditioned(here) is unknowns:
+        return _descended(lens, table, start, here, TO_THE_END, LEAST_DAMPING)
     # along a curved valley damping must hold back each unknown, not combinations of them that are alike
-    near = _descended(lens, table, start, unknowns, NEAR, NEAR)
-    return _descended(lens, table, near.estimate, well_conditioned(near.equations), TO_THE_END, LEAST_DAMPING)
+    near = _descended(lens, table, start, here, NEAR, NEAR)
+    combined = linearise(lens, table, near.estimate, well_conditioned(near.equations))
+    return _descended(lens, table, near.estimate, combined, TO_THE_END, LEAST_DAMPING)
 
 
 def _descended(
-    lens: LensModel, table: CornerTable, start: Estimate, unknowns: Unknowns, tolerance: float, damping: float
+    lens: LensModel,
+    table: CornerTable,
+    estimate: Estimate,
+    equations: NormalEquations,
+    tolerance: float,
+    damping: float,
 ) -> Minimum:
     """Until a step promises to lower the cost by less than the tolerance, as a part of it."""
-    estimate, equations = start, linearise(lens, table, start, unknowns)
     rounding = EXACT_PX * table.typical_weight * len(table) ** 0.5
     growth, fall, polishes = GROWTH, 0.01, 0
     for _ in range(MAX_STEPS):
         step = _step(equations, damping)
-        there = _after(lens, table, estimate, unknowns, step) if step else None
+        there = _after(lens, table, estimate, equations.unknowns, step) if step else None
         slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
         if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
             damping, growth, fall = damping * growth, growth * 2.0, 0.3

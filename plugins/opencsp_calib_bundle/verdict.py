@@ -54,7 +54,8 @@ def checked_covariance(
     _check_determined(observations, np.concatenate([sigma[:2] / params[:2], sigma[2:4] / max(observations.image_size)]))
     if not minimum.converged:
         raise CalibrationFailedError(
-            f"the solution of {lens.name!r} did not converge: take a simpler lens model, more views, or a guess"
+            f"the solution of {lens.name!r} did not converge: the views do not tell its coefficients apart, or it "
+            "folds back at the outermost corners; take a simpler lens model, or more views"
         )
     return information * equations.cost / equations.dof
 
