@@ -4,11 +4,11 @@ A board taken as flat that is not spoils the camera far beyond what its rms show
 for costs little: sigmas 1.9, 1.5, 1.2 times as large at 10, 20, 50 views. rms and held-out rms always prefer the
 shape. Two things tell whether it is worth its price:
 
-*   the odd and the even views, solved apart, agree better over the image with the shape than without it; or
+*   the odd and the even views, solved apart, agree clearly better over the image with the shape than without it; or
 *   solving for the shape moves the camera by more than its own uncertainty explains. Halves cannot see an error that
-    both of them share, and two halves with like poses share most of what a bent board does: on worlds with a board
-    0.5 mm out of flat the halves alone chose wrongly in every second one, with the camera off by ten sigmas. (An
-    estimate that is right either way is held against one that is only right if the board is flat: Hausman 1978.)
+    both of them share, and two halves with like poses share most of what a bent board does: of worlds with a board
+    0.5 mm out of flat and noise of 0.1 px they get most wrong, with the camera off by ten sigmas. (An estimate that is
+    right either way is held against one that is right only if the board is flat: Hausman 1978.)
 """
 
 from collections.abc import Callable
@@ -39,6 +39,7 @@ MIN_VIEWS = 8
 MIN_DIRECTIONS_DEG = 20.0
 """Between two lines of sight, in the board's frame: with less, heights are known three times worse than places."""
 TURNED_DEG = 45.0
+CLEARLY = 1.5  # two halves are one draw of a figure that scatters by about half: less is chance
 SIGMAS = 2.0  # a camera that moves by more has a bias that outweighs what the shape adds to its variance
 
 
@@ -61,7 +62,8 @@ class _Evidence:
 
     @property
     def for_shape(self) -> bool:
-        return self.solved_halves_px < self.given_halves_px or self.moved_px > SIGMAS * self.sigma_px
+        by_halves = CLEARLY * self.solved_halves_px < self.given_halves_px
+        return by_halves or self.moved_px > SIGMAS * self.sigma_px
 
     def __str__(self) -> str:
         return (

@@ -1,7 +1,10 @@
 """Whether a camera calibrated before, or imported, is still good for new photographs.
 
 Residuals alone do not tell: each view's pose is fitted, and hides much of what has changed. So the camera is solved
-afresh from the same photographs, and the two are compared by projection at the range where the board was.
+afresh from the same photographs, and the two are compared by projection: at the range where the board was, and at
+infinity. At one range a shift of the frame makes up for nearly all of another focal length (for 0.5 % of it, on a
+camera as Sandia's, the difference is within the noise), so that the range alone would call a refocused lens good; at
+infinity nothing makes up for it.
 """
 
 from dataclasses import dataclass, field
@@ -20,13 +23,46 @@ from opencsp_calib.projection_sigma import camera_sigma_map, sigma_map
 from opencsp_calib.resampling import Solve
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["Check", "Verdict", "check"]
+__all__ = ["Check", "Judged", "Verdict", "check"]
 
 Verdict = Literal["ok", "degraded", "wrong"]
 
+SEVERITY: tuple[Verdict, ...] = ("ok", "degraded", "wrong")
 OK_SIGMAS = 2.0
 WRONG_SIGMAS = 5.0
 WRONG_PX = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One comparison, and what uncertainty alone would explain of it.
+
+    Parameters
+    ----------
+    difference : Difference
+        From the fresh camera to the one checked, frames aligned.
+    predicted_px : float
+        One sigma of its rms over the image.
+    """
+
+    difference: Difference = field(repr=False)
+    predicted_px: float
+
+    @property
+    def sigmas(self) -> float:
+        """How many sigmas the difference is."""
+        return self.difference.rms_px / self.predicted_px
+
+    @property
+    def verdict(self) -> Verdict:
+        """``ok``: no farther off than two sigmas; ``wrong``: beyond five, or by more than 1 px; else ``degraded``.
+
+        Where the photographs are so few that two sigmas are more than a pixel, they cannot say that it is ok.
+        """
+        off_by_a_pixel = self.difference.worst_px > WRONG_PX
+        if self.sigmas <= OK_SIGMAS:
+            return "degraded" if off_by_a_pixel else "ok"
+        return "wrong" if self.sigmas > WRONG_SIGMAS or off_by_a_pixel else "degraded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,12 +75,8 @@ class Check:
         Which was checked.
     fresh : Calibration
         Solved from the photographs.
-    range_m : float
-        Where the cameras are compared: the median distance of the corners from the camera.
-    difference : Difference
-        From the fresh camera to the one checked, frames aligned.
-    predicted_px : float
-        The rms difference over the image that uncertainty alone explains, one sigma.
+    at_range, at_infinity : Judged
+        At the median distance of the corners from the camera, and at infinity.
     view_rms_px : (V,)
         Residuals of each used view with the camera held and only the pose fitted, on the board as the fresh solution
         has it; NaN where the camera cannot see the corners at all.
@@ -52,44 +84,36 @@ class Check:
 
     camera: Camera
     fresh: Calibration = field(repr=False)
-    range_m: float
-    difference: Difference = field(repr=False)
-    predicted_px: float
+    at_range: Judged
+    at_infinity: Judged
     view_rms_px: Floats = field(repr=False)
 
     @property
-    def verdict(self) -> Verdict:
-        """``ok``: no farther off than two sigmas; ``wrong``: beyond five, or by more than 1 px; else ``degraded``.
+    def decisive(self) -> Judged:
+        """The comparison with the worse verdict; of two alike, the one that is more sigmas off."""
+        return max((self.at_range, self.at_infinity), key=lambda one: (SEVERITY.index(one.verdict), one.sigmas))
 
-        Where the photographs are so few that two sigmas are more than a pixel, they cannot say that it is ok.
-        """
-        rms, worst = self.difference.rms_px, self.difference.worst_px
-        if rms > WRONG_SIGMAS * self.predicted_px:
-            return "wrong"
-        if rms > OK_SIGMAS * self.predicted_px:
-            return "wrong" if worst > WRONG_PX else "degraded"
-        return "ok" if worst <= WRONG_PX else "degraded"
+    @property
+    def verdict(self) -> Verdict:
+        """The worse of the two; see `Judged.verdict`."""
+        return self.decisive.verdict
 
     @property
     def problems(self) -> tuple[Problem, ...]:
         """What a person should know: what is said of the fresh solution, and where it is too weak to judge by."""
-        if not OK_SIGMAS * self.predicted_px > WRONG_PX:
+        if not OK_SIGMAS * self.decisive.predicted_px > WRONG_PX:
             return self.fresh.problems
         message = (
-            f"these photographs determine the camera to {self.predicted_px:.2g} px only, too little to judge another "
-            "by: take more, with the board tilted and all over the image"
+            f"these photographs determine the camera to {self.decisive.predicted_px:.2g} px only, too little to judge "
+            "another by: take more, with the board tilted and all over the image"
         )
         return (Problem("check-too-weak", message), *self.fresh.problems)
 
     @property
     def reasons(self) -> tuple[str, ...]:
-        """For people: what the verdict rests on, and what there is to say of the photographs."""
-        apart = self.difference
-        off = (
-            f"at {self.range_m:.2f} m the camera is {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} px at worst) off a "
-            f"fresh solution; uncertainty explains {self.predicted_px:.2g} px rms"
-        )
-        return (off, self._of_residuals(), *(problem.message for problem in self.problems))
+        """For people: what the verdict rests on, the most important first."""
+        compared = [_sentence(one) for one in sorted((self.at_range, self.at_infinity), key=lambda j: -j.sigmas)]
+        return (*compared, self._of_residuals())
 
     def _of_residuals(self) -> str:
         blind = [
@@ -102,8 +126,13 @@ class Check:
 
     def as_json(self) -> dict[str, Any]:
         """What ``check --json`` prints."""
-        rms, worst = self.difference.rms_px, self.difference.worst_px
-        return {"rms_px": rms, "worst_px": worst, "predicted_px": self.predicted_px, "verdict": self.verdict}
+        apart = self.decisive.difference
+        return {
+            "rms_px": apart.rms_px,
+            "worst_px": apart.worst_px,
+            "predicted_px": self.decisive.predicted_px,
+            "verdict": self.verdict,
+        }
 
 
 def check(camera: Camera, observations: Observations, solve: Solve, *, covariance: Matrix | None = None) -> Check:
@@ -136,12 +165,27 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
     if not np.isfinite(fresh.covariance).all():
         said = fresh.problems[-1].message if fresh.problems else "its uncertainty is not known"
         raise CalibrationFailedError(f"no fresh solution to check against: {said}")
-    range_m = _working_range(fresh)
+    at_range, at_infinity = (
+        Judged(compare(fresh.camera, camera, range_m=r), _predicted(camera, fresh, covariance, r))
+        for r in (_working_range(fresh), None)
+    )
+    return Check(camera, fresh, at_range, at_infinity, _view_rms(camera, fresh))
+
+
+def _predicted(camera: Camera, fresh: Calibration, covariance: Matrix | None, range_m: float | None) -> float:
     predicted = sigma_map(fresh, range_m).rms_px
-    if covariance is not None and np.isfinite(covariance).all():
-        predicted = float(np.hypot(predicted, camera_sigma_map(camera, covariance, range_m).rms_px))
-    difference = compare(fresh.camera, camera, range_m=range_m)
-    return Check(camera, fresh, range_m, difference, predicted, _view_rms(camera, fresh))
+    if covariance is None or not np.isfinite(covariance).all():
+        return predicted
+    return float(np.hypot(predicted, camera_sigma_map(camera, covariance, range_m).rms_px))
+
+
+def _sentence(judged: Judged) -> str:
+    apart = judged.difference
+    where = "at infinity" if apart.range_m is None else f"at the board's range of {apart.range_m:.2f} m"
+    return (
+        f"{where} the camera is {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} px at worst) off a fresh solution; "
+        f"uncertainty explains {judged.predicted_px:.2g} px rms: {judged.verdict}"
+    )
 
 
 def _working_range(calibration: Calibration) -> float:

@@ -65,10 +65,8 @@ def check(
     covariance = calibration.covariance if calibration else None
     found = checked(known, observations, lambda views: pipeline.solve(views, known.model), covariance=covariance)
     say(f"{known.name}: {found.verdict}")
-    say(
-        f"at {found.range_m:.2f} m it differs from a fresh calibration by {found.difference.rms_px:.3g} px rms, "
-        f"{found.difference.worst_px:.3g} px at worst; {found.predicted_px:.3g} px rms is what uncertainty explains"
-    )
+    for reason in found.reasons:
+        say(reason)
     say_problems(found.problems)
     if json:
         print_json(found.as_json())
