@@ -20,6 +20,7 @@ from opencsp_calib_bundle.verdict import checked_covariance, remarks
 __all__ = ["BundleSolver"]
 
 ROUNDS = 10  # of weights, then of outliers: they settle in two or three
+POOR_PX = 1.0  # where residuals are typically larger, a guess may have led astray
 SETTLED = 0.9  # of the scale of the residuals before: when they fall no further, weights have settled
 
 
@@ -80,7 +81,16 @@ def _roughly(observations: Observations, model: str, options: SolveOptions, tabl
     """An estimate near enough to tell outliers from it, with the board as given."""
     lens = LENS_MODELS[model]
     unknowns = _unknowns(observations, lens, replace(options, board_shape="flat"))
-    estimate = _rough_minimum(lens, table, start(observations, model, options), unknowns, options.robust)
+
+    def from_start(chosen: SolveOptions) -> Estimate:
+        return _rough_minimum(lens, table, start(observations, model, chosen), unknowns, options.robust)
+
+    def misfit(estimate: Estimate) -> float:
+        return float(np.median(np.linalg.norm(residuals(lens, table, estimate), axis=1)))
+
+    estimate = from_start(options)
+    if options.guess is not None and misfit(estimate) > POOR_PX:
+        estimate = min(estimate, from_start(replace(options, guess=None)), key=misfit)
     camera = Camera("camera", model, estimate.params, observations.image_size)
     return with_deeper_minima(observations, camera, estimate, table)
 

@@ -14,6 +14,7 @@ __all__ = ["checked_covariance", "remarks"]
 MANY_OUTLIERS = 0.03
 OPEN_FOCAL = 0.05  # sigma of a focal length over the focal length, above which it is as good as unknown
 OPEN_CENTRE = 0.2  # sigma of the principal point over the image's longer side, likewise
+MISFIT_PX = 5.0  # rms beyond which something else than noise is wrong
 LEAST_SIGMA_PX = 0.01  # of a corner, per axis: what can be hoped for; exact corners of a bad set are no better set
 
 
@@ -51,7 +52,9 @@ def checked_covariance(
     with np.errstate(invalid="ignore"):
         sigma = np.sqrt(np.diag(information)) * max(floor, (equations.cost / equations.dof) ** 0.5)
     params = minimum.estimate.params
-    _check_determined(observations, np.concatenate([sigma[:2] / params[:2], sigma[2:4] / max(observations.image_size)]))
+    relative = np.concatenate([sigma[:2] / params[:2], sigma[2:4] / max(observations.image_size)])
+    rms_px = (equations.cost / equations.numbers * 2.0) ** 0.5 / typical_weight
+    _check_determined(len(observations.used), relative, rms_px)
     if not minimum.converged:
         raise CalibrationFailedError(
             f"the solution of {lens.name!r} did not converge: the views do not tell its coefficients apart, or it "
@@ -65,16 +68,15 @@ def remarks(calibration: Calibration) -> tuple[Problem, ...]:
     return (*_of_outliers(calibration), *_of_weights(calibration), *_of_board(calibration), *_of_aspect(calibration))
 
 
-def _check_determined(observations: Observations, relative: Floats) -> None:
+def _check_determined(views: int, relative: Floats, rms_px: float) -> None:
     limits = np.array([OPEN_FOCAL, OPEN_FOCAL, OPEN_CENTRE, OPEN_CENTRE])
     if (relative <= limits).all():  # NaN is not
         return
-    views = len(observations.used)
     what = "principal point" if (relative[:2] <= OPEN_FOCAL).all() else "focal length"
-    raise CalibrationFailedError(
-        f"{views} views do not determine the {what}: take more, with the board tilted by 30 to 45 degrees in different "
-        "directions, or a simpler lens model"
-    )
+    cure = "take more, with the board tilted by 30 to 45 degrees in different directions, or a simpler lens model"
+    if rms_px > MISFIT_PX:
+        cure = f"their corners do not fit the board (rms {rms_px:.1f} px); check its description and the photographs"
+    raise CalibrationFailedError(f"{views} views do not determine the {what}: {cure}")
 
 
 def _of_outliers(calibration: Calibration) -> tuple[Problem, ...]:
