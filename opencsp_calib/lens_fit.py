@@ -21,6 +21,7 @@ NODES = 2500  # about how many pixels of the image are compared
 LADDER = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12", "opencv14")
 """Each step starts from the one before: rational models started from nothing end in false minima."""
 
+FOLDED_PX = 1e6  # stands for the error of a ray beyond a fold, so that a step there is taken back
 STEP = 1e-6  # for numerical derivatives of a stranger's projection, radians
 GRAZING = 1e-3  # z of the flattest ray that a model on the plane is asked to carry
 
@@ -230,14 +231,16 @@ def _adjusted(lens: LensModel, rays: Points, pixels: Pixels, start: Params) -> P
     from scipy.optimize import least_squares
 
     def residuals(params: Params) -> Floats:
-        return np.asarray((lens.project(rays, params) - pixels).ravel(), dtype=np.float64)
+        found = lens.project(rays, params) - pixels
+        return np.asarray(np.where(np.isfinite(found), found, FOLDED_PX).ravel(), dtype=np.float64)
 
     def jacobian(params: Params) -> Floats:
         return lens.project_with_jacobians(rays, params)[2].reshape(-1, len(params))
 
-    if not np.isfinite(residuals(start)).all():
+    if (residuals(start) == FOLDED_PX).any():
         raise InputError(f"the start of the fit does not show all of the image as {lens.name}; give another, or none")
+    # MINPACK, because scipy's own method keeps every core busy with singular values of so tall a matrix
     found = least_squares(
-        residuals, start, jac=jacobian, x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=300
+        residuals, start, jac=jacobian, method="lm", x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=300
     )
     return np.asarray(found.x, dtype=np.float64)
