@@ -17,7 +17,7 @@ __all__ = ["FitCorners", "corner_fit", "prepare"]
 
 FitCorners: TypeAlias = Callable[..., None]
 
-SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, f8[::1], f8[:, ::1])"
+SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, b1, f8[::1], f8[:, ::1])"
 
 _log = logging.getLogger(__name__)
 _lock = threading.Lock()

@@ -1,19 +1,22 @@
-"""Fits the image of a corner around many places at once: arrays in, arrays out."""
+"""What a fit says of many corners at once: where they are, how blurred, how sure; and where a fit begins."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Covariances, Floats, Ids, Mask, Pixels
-from opencsp_calib.compiled import corner_fit
 
-__all__ = ["CornerFit", "begin", "improve", "windows"]
+__all__ = ["CornerFit", "Levels", "begin"]
 
-MOST_STEPS = 15
+Levels: TypeAlias = NDArray[np.uint16]  # (height, width)
+
 FIRST_BLUR_PX = 1.5
-SMALLEST_HALF_WINDOW_PX = 2.5
 ROUNDING = 1 / 12  # variance of grey levels: the least noise an image can have
+MOST_NOISE = 1.4  # how far the variance of one corner's noise may be above the usual by chance
+STAIN_PIXELS = 50.0  # that pull as one
+HIDDEN_BY_SATURATION = 0.12  # of the edge width: what a change of the light moves that saturated pixels do not show
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,8 +25,8 @@ class CornerFit:
 
     Parameters
     ----------
-    parameters : (n, 9)
-    diagnostics : (n, 22)
+    parameters : (n, 11)
+    diagnostics : (n, 23)
         NaN where nothing is known yet.
     """
 
@@ -52,14 +55,14 @@ class CornerFit:
         return self.parameters[:, 6]
 
     @property
+    def dark(self) -> Floats:
+        """(n,) grey level of the darker squares."""
+        return np.asarray(self.parameters[:, 5] - np.abs(self.amplitude))
+
+    @property
     def converged(self) -> Mask:
         """(n,) whether there is a result."""
         return np.asarray(self.diagnostics[:, 0] == 0)
-
-    @property
-    def outside(self) -> Mask:
-        """(n,) whether the window was not within the image."""
-        return np.asarray(self.diagnostics[:, 0] == 1)
 
     @property
     def misfit(self) -> Floats:
@@ -88,37 +91,49 @@ class CornerFit:
     def covariance(self, bend_deviations: Floats) -> Covariances:
         """(n, 2, 2) px², when the bends (1/px) that were given are known with these deviations (n, 2).
 
-        Where the noise of neighbouring pixels is correlated, so are their pulls on the corner: fully along the edge, less
-        across, where the pull is a Gaussian's derivative.
+        Noise, how well bends are known, and what saturation hides.
         """
         xx, xy, yy = self.diagnostics[:, 3:6].T
         unit = np.stack([np.stack([xx, xy], axis=-1), np.stack([xy, yy], axis=-1)], axis=-2)
-        across = np.exp(-1 / (4 * self.blur_px**2))
-        variance = self.variance * (1 + 2 * self.correlation) * (1 + 2 * self.correlation * across)
         response = self.diagnostics[:, 6:10].reshape(-1, 2, 2) * bend_deviations[:, None, :]
-        return np.asarray(unit * variance[:, None, None] + response @ response.transpose(0, 2, 1))
+        hidden = HIDDEN_BY_SATURATION * self.blur_px * self.quarter_saturation.max(axis=1)
+        covariance = unit * self._pulling_variance[:, None, None] + response @ response.transpose(0, 2, 1)
+        return np.asarray(covariance + hidden[:, None, None] ** 2 * np.eye(2))
 
-    def replaced(self, where: Ids, other: "CornerFit") -> "CornerFit":
+    @property
+    def _pulling_variance(self) -> Floats:
+        """(n,) of independent pixels that would move the corner as much as these do.
+
+        Where the noise of neighbours is correlated, so are their pulls: fully along the edge, less across, where the
+        pull is a Gaussian's derivative. What one corner leaves beyond the image's usual is a stain or a reflection, and
+        of a size that pulls as one.
+        """
+        correlation = self.correlation
+        across = np.exp(-1 / (4 * self.blur_px**2))
+        stain = np.maximum(self.variance - MOST_NOISE * self.noise_variance / (1 - correlation), 0)
+        return np.asarray(self.variance * (1 + 2 * correlation) * (1 + 2 * correlation * across) + STAIN_PIXELS * stain)
+
+    def replaced(self, where: Ids | Mask, other: "CornerFit") -> "CornerFit":
         """The same with other fits (m) at some places (m,)."""
         parameters, diagnostics = self.parameters.copy(), self.diagnostics.copy()
         parameters[where], diagnostics[where] = other.parameters, other.diagnostics
         return CornerFit(parameters, diagnostics)
 
-    def __getitem__(self, where: Ids) -> "CornerFit":
+    def __getitem__(self, where: Ids | Mask) -> "CornerFit":
         return CornerFit(self.parameters[where], self.diagnostics[where])
 
     @property
-    def quadrant_misfit(self) -> Floats:
+    def quarter_misfit(self) -> Floats:
         """(n, 4) mean residual in each quarter of the window, as a fraction of the amplitude."""
         return self.diagnostics[:, 10:14]
 
     @property
-    def quadrant_saturation(self) -> Floats:
+    def quarter_saturation(self) -> Floats:
         """(n, 4) share of saturated pixels in each quarter of the window."""
         return self.diagnostics[:, 14:18]
 
 
-def begin(image: NDArray[np.uint16], pixels: Pixels, vectors: Floats) -> CornerFit:
+def begin(image: Levels, pixels: Pixels, vectors: Floats) -> CornerFit:
     """A first guess: grey levels read at a few places in each of the four squares around a corner.
 
     Parameters
@@ -144,62 +159,3 @@ def begin(image: NDArray[np.uint16], pixels: Pixels, vectors: Floats) -> CornerF
     parameters[:, 5] = levels.mean(axis=(1, 2))
     parameters[:, 6] = -(levels * same_side).mean(axis=(1, 2))
     return CornerFit(parameters, np.full((len(pixels), DIAGNOSTICS), np.nan))
-
-
-def improve(
-    image: NDArray[np.uint16], white: int, start: CornerFit, bends: Floats, half_windows: Floats, tolerance_px: float
-) -> CornerFit:
-    """The fit, from a start.
-
-    Parameters
-    ----------
-    image : (height, width)
-    white : int
-        Grey level at which pixels are saturated.
-    start : CornerFit
-    bends : (n, 2) 1/px
-        Curvature of the two edges.
-    half_windows : (n, 4) px
-        See `windows`; NaN where no fit shall be made.
-    tolerance_px : float
-        The last step is shorter.
-    """
-    from opencsp_calib.corner_kernel import DIAGNOSTICS, WORK_SIZE
-
-    parameters = start.parameters.copy()
-    found = np.zeros((len(parameters), DIAGNOSTICS))
-    args = np.ascontiguousarray(bends), np.ascontiguousarray(half_windows)
-    corner_fit()(image, float(white), parameters, *args, tolerance_px, MOST_STEPS, np.empty(WORK_SIZE), found)
-    return CornerFit(parameters, found)
-
-
-def windows(
-    fit: CornerFit, lengths: Floats, image_size: tuple[int, int], fraction: float, largest_px: float, clear: float
-) -> Floats:
-    """Half the window along both edges, and how far from an edge the pattern is a checkerboard's.
-
-    Parameters
-    ----------
-    fit : CornerFit
-    lengths : (n, 2) px
-        Of the squares' sides.
-    image_size : (int, int)
-    fraction, largest_px : float
-        The half-window is this part of a square's side, at most so many pixels, and less near the image's border, so
-        that it stays symmetric about the corner.
-    clear : float
-        The part of a square's side, from its edge on, that nothing is printed in; infinite for plain checkerboards.
-
-    Returns
-    -------
-    (n, 4) px
-        NaN where the image's border is too near.
-    """
-    from opencsp_calib.corner_kernel import RAMP_PX
-
-    halves = np.minimum(fraction * lengths, largest_px)
-    reach = ((halves + RAMP_PX)[:, :, None] * np.abs(fit.directions)).sum(axis=1)
-    room = np.minimum(fit.pixels, np.array(image_size) - 1 - fit.pixels)
-    shrunk = halves * np.minimum(1, (room / reach).min(axis=1))[:, None]
-    shrunk[~(shrunk.min(axis=1) >= np.minimum(SMALLEST_HALF_WINDOW_PX, halves.min(axis=1)))] = np.nan
-    return np.concatenate([shrunk, np.maximum(clear * lengths - fit.blur_px[:, None], 1.0)], axis=1)

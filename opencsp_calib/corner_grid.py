@@ -4,11 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats, Ids, Pixels
+from opencsp_calib.arrays import Floats, Ids, Mask, Pixels
 
-__all__ = ["bends", "edges", "parity"]
+__all__ = ["bends", "displaced", "edges", "parity"]
 
-ROBUST_STEPS = 10
+ROBUST_STEPS = 5
+LEAST_DISPLACED_PX, LEAST_DISPLACED_DEVIATIONS = 0.5, 10.0
 
 
 def parity(ids: Ids, columns: int) -> Floats:
@@ -39,12 +40,12 @@ def edges(pixels: Pixels, ids: Ids, columns: int) -> tuple[Floats, Floats]:
     vectors, lengths = np.empty((len(ids), 2, 2)), np.empty((len(ids), 2))
     for axis, (before, after) in enumerate(_neighbours(grid, ids, columns)):
         steps = np.stack([pixels - before, after - pixels])
-        known = np.asarray(np.isfinite(steps[..., :1]) & np.isfinite(steps[..., 1:]))
+        known = np.isfinite(steps.sum(axis=2, keepdims=True))
         with np.errstate(invalid="ignore"):
             vectors[:, axis] = np.where(known, steps, 0).sum(axis=0) / known.sum(axis=0)
-        norms = np.where(known[..., 0], np.linalg.norm(steps, axis=2), np.inf)
+        norms = np.where(known.reshape(2, -1), np.linalg.norm(steps, axis=2), np.inf)
         lengths[:, axis] = norms.min(axis=0)
-        alone = ~known.any(axis=0)[:, 0]
+        alone = ~known.any(axis=0).ravel()
         if alone.any() and not alone.all():
             nearest = _nearest(ids[alone], ids[~alone], columns)
             vectors[alone, axis] = vectors[~alone, axis][nearest]
@@ -82,15 +83,41 @@ def bends(pixels: Pixels, ids: Ids, columns: int) -> tuple[Floats, Floats]:
     return values, deviations
 
 
-def _placed(pixels: Pixels, ids: Ids, columns: int) -> Floats:
-    """(rows + 2, columns + 2, 2) px, NaN where there is no corner, and all around."""
-    grid = np.full((int(ids.max()) // columns + 3, columns + 2, 2), np.nan)
+def displaced(pixels: Pixels, ids: Ids, columns: int) -> Mask:
+    """(n,) whether a corner is not where its neighbours place it, as judged by how well others are where theirs do.
+
+    One corner that is off by d bends its row by -d at its own place and by d/2 on both sides, whatever distortion and
+    perspective do, which change slowly. The largest of such a group is the culprit.
+    """
+    off = np.zeros(len(ids), dtype=bool)
+    for axis, (before, after) in enumerate(_neighbours(_placed(pixels, ids, columns), ids, columns)):
+        along = after - before
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+        offset = ((pixels - (before + after) / 2) * normal).sum(axis=1)
+        size = np.abs(offset - np.nan_to_num(_beside(offset, ids, columns, axis).mean(axis=0)))
+        known = np.isfinite(size)
+        if known.any():
+            usual = 1.4826 * float(np.median(size[known]))
+            largest = ~(_beside(size, ids, columns, axis) > size).any(axis=0)
+            off |= (size > max(LEAST_DISPLACED_PX, LEAST_DISPLACED_DEVIATIONS * usual)) & largest
+    return off
+
+
+def _placed(values: Floats, ids: Ids, columns: int) -> Floats:
+    """(rows + 2, columns + 2, ...), NaN where there is no corner, and all around."""
+    grid = np.full((int(ids.max()) // columns + 3, columns + 2, *values.shape[1:]), np.nan)
     row, column = np.divmod(ids, columns)
-    grid[row + 1, column + 1] = pixels
+    grid[row + 1, column + 1] = values
     return grid
 
 
-def _neighbours(grid: Floats, ids: Ids, columns: int) -> Iterator[tuple[Pixels, Pixels]]:
+def _beside(values: Floats, ids: Ids, columns: int, axis: int) -> Floats:
+    """(2, n) the values (n,) of the corners before and after each along an axis, NaN where there is none."""
+    before_and_after = list(_neighbours(_placed(values, ids, columns), ids, columns))
+    return np.stack(before_and_after[axis])
+
+
+def _neighbours(grid: Floats, ids: Ids, columns: int) -> Iterator[tuple[Floats, Floats]]:
     """Before and after each corner: along its row, then along its column."""
     row, column = np.divmod(ids, columns)
     yield grid[row + 1, column], grid[row + 1, column + 2]
@@ -119,7 +146,7 @@ def _smoothed(measured: Floats, row: Ids, column: Ids) -> tuple[Floats, Floats]:
     weights = np.ones(n)
     for _ in range(ROBUST_STEPS):
         weighted = design * weights[:, None]
-        inverse = np.linalg.pinv(weighted.T @ design)
+        inverse = np.linalg.pinv(weighted.T @ design, hermitian=True)
         residuals = values - design @ (inverse @ (weighted.T @ values))
         scale = 1.4826 * float(np.median(np.abs(residuals))) + 1e-12
         weights = 1 / (1 + (residuals / (2 * scale)) ** 2)

@@ -1,10 +1,10 @@
 """The compiled fit of the image of a checkerboard's corner. Importing this imports Numba: see `opencsp_calib.compiled`.
 
-Around a corner the image is taken as ``light (a + b u v)``. u and v are the profiles, from -1 to 1, of two edges that
+Around a corner the image is taken as ``a + b u v``. u and v are the profiles, from -1 to 1, of two edges that
 cross in the corner: a step seen through a Gaussian of deviation s. What the product lacks is added to first order: for
 the pixel's own area, which is no Gaussian, by the Gram-Charlier series with the fourth cumulant of a box; for edges
 that are not perpendicular, by the tetrachoric series of the bivariate normal distribution. Edges may be bent, by a
-curvature that is given. ``light`` is ``1 + gx x + gy y``.
+curvature that is given. a and b have gradients: light that changes across the board scales both, a reflection is added.
 
 Whatever else is wrong with this model is alike on opposite sides of the corner (another psf, neighbouring squares, a
 tone curve) and so does not move it, as long as the window is symmetric about the corner: therefore the window follows
@@ -28,15 +28,15 @@ from opencsp_calib.arrays import Floats
 
 __all__ = ["CONVERGED", "DIAGNOSTICS", "FAILED", "OUTSIDE", "PARAMETERS", "RAMP_PX", "WORK_SIZE", "fit_corners"]
 
-PARAMETERS = 9  # x, y, angle of edge 1, of edge 2, s, a, b, gx, gy
-DIAGNOSTICS = 22
+PARAMETERS = 11  # x, y, angle of edge 1, of edge 2, s, a, b, gradient of a in x and y, gradient of b
+DIAGNOSTICS = 23
 RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of the window
 
-# Columns of the buffer: derivatives by each parameter, residual, x, y, grey level, root of the weight. The largest
-# window, a parallelogram with sides of 2 * 14 + 1.5 px, holds fewer than 1088 pixels.
+# Columns of the buffer: derivatives by each parameter, residual, x, y, grey level. The derivative by a is the root
+# of the weight. The largest window, a parallelogram with sides of 2 * 14 + 1.5 px, holds fewer than 1088 pixels.
 STRIDE = 1088
-RESIDUAL, X, Y, LEVEL, ROOT = 9 * STRIDE, 10 * STRIDE, 11 * STRIDE, 12 * STRIDE, 13 * STRIDE
-PLACED, SIDE = 14 * STRIDE, 64  # then residuals as a picture, the corner in its middle
+RESIDUAL, X, Y, LEVEL, ROOT = 11 * STRIDE, 12 * STRIDE, 13 * STRIDE, 14 * STRIDE, 5 * STRIDE
+PLACED, SIDE = 15 * STRIDE, 64  # then residuals as a picture, the corner in its middle
 WORK_SIZE = PLACED + SIDE * SIDE
 
 CONVERGED, OUTSIDE, FAILED = 0, 1, 2
@@ -116,7 +116,7 @@ def _gather(image: NDArray[np.uint16], p: Floats, window: Floats, work: Floats) 
 @_fast
 def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int, work: Floats) -> float:
     """Fill the columns: residual and derivatives, each times the root of the pixel's weight; the sum of weights."""
-    s, a, b, gx, gy = p[4], p[5], p[6], p[7], p[8]
+    s = p[4]
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
     cosine, stretch = x1 * x2 + y1 * y2, 1.0 / abs(x1 * y2 - y1 * x2)
     box = -1.0 / (1440.0 * s**4)  # the fourth cumulant of a box of width w is -w^4/120; over 12, see _profile
@@ -137,21 +137,24 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
         u, du = _profile(z1, kurtosis1)
         v, dv = _profile(z2, kurtosis2)
         pattern = u * v + cosine * du * dv * (1.0 + 0.5 * cosine * z1 * z2)
-        light = root * (1.0 + gx * x + gy * y)
-        plain = a + b * pattern
-        slope1 = b / s * light * du * v
-        slope2 = b / s * light * u * dv
+        steepness = root * (p[6] + p[9] * x + p[10] * y) / s
+        slope1 = steepness * du * v
+        slope2 = steepness * u * dv
         work[k] = slope1 * y1 + slope2 * y2
         work[STRIDE + k] = -slope1 * x1 - slope2 * x2
         work[2 * STRIDE + k] = -slope1 * turn1
         work[3 * STRIDE + k] = -slope2 * turn2
         work[4 * STRIDE + k] = -(slope1 * z1 + slope2 * z2)
-        work[5 * STRIDE + k] = light
-        work[6 * STRIDE + k] = light * pattern
-        work[7 * STRIDE + k] = root * x * plain
-        work[8 * STRIDE + k] = root * y * plain
-        work[ROOT + k] = root
-        work[RESIDUAL + k] = root * work[LEVEL + k] - light * plain
+        work[5 * STRIDE + k] = root
+        work[6 * STRIDE + k] = root * pattern
+    for k in range(n):  # a loop of its own, for the compiler's hundred pairs
+        x, y, root, pattern = work[X + k], work[Y + k], work[5 * STRIDE + k], work[6 * STRIDE + k]
+        work[7 * STRIDE + k] = root * x
+        work[8 * STRIDE + k] = root * y
+        work[9 * STRIDE + k] = pattern * x
+        work[10 * STRIDE + k] = pattern * y
+        plain = root * (p[5] + p[7] * x + p[8] * y) + pattern * (p[6] + p[9] * x + p[10] * y)
+        work[RESIDUAL + k] = root * work[LEVEL + k] - plain
     return total
 
 
@@ -248,28 +251,40 @@ def _fit(
 
 
 @_fast
-def _respond(p: Floats, n: int, work: Floats, factor: Floats, row: int, vector: Floats) -> tuple[float, float]:
-    """How far x (row 0) or y (row 1) moves, px, with each edge's bend (1/px); its row of the inverse too."""
-    for k in range(len(vector)):
-        vector[k] = 1.0 if k == row else 0.0
-    _solve(factor, vector)
+def _pull(p: Floats, n: int, work: Floats, pulls: Floats) -> None:
+    """How hard each edge's bend pulls at each parameter: its derivative's products with the others."""
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
-    response1 = response2 = 0.0
-    for k in range(n):
-        pull = 0.0
-        for i in range(len(vector)):
-            pull += vector[i] * work[i * STRIDE + k]
-        response1 += pull * work[2 * STRIDE + k] * (work[X + k] * x1 + work[Y + k] * y1)
-        response2 += pull * work[3 * STRIDE + k] * (work[X + k] * x2 + work[Y + k] * y2)
-    return 0.5 * response1, 0.5 * response2
+    for i in range(len(pulls)):
+        pull1 = pull2 = 0.0
+        for k in range(n):
+            x, y, column = work[X + k], work[Y + k], work[i * STRIDE + k]
+            pull1 += column * work[2 * STRIDE + k] * (x * x1 + y * y1)
+            pull2 += column * work[3 * STRIDE + k] * (x * x2 + y * y2)
+        pulls[i, 0], pulls[i, 1] = 0.5 * pull1, 0.5 * pull2
+
+
+@_exact
+def _examine_place(p: Floats, n: int, work: Floats, factor: Floats, pulls: Floats, row: Floats, found: Floats) -> None:
+    """The inverse normal matrix of x and y, and their response to bends."""
+    _pull(p, n, work, pulls)
+    for coordinate in range(2):
+        for k in range(len(row)):
+            row[k] = 1.0 if k == coordinate else 0.0
+        _solve(factor, row)
+        found[3 + coordinate], found[4 + coordinate] = row[0], row[1]
+        for edge in range(2):
+            for k in range(len(row)):
+                found[6 + 2 * coordinate + edge] += row[k] * pulls[k, edge]
 
 
 @_exact
 def _examine_quarters(p: Floats, n: int, white: float, work: Floats, found: Floats) -> None:
     """Each quarter's mean residual, over the amplitude, and its share of saturated pixels."""
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
+    total = 0.0
     for k in range(n):
         x, y, root = work[X + k], work[Y + k], work[ROOT + k]
+        total += work[RESIDUAL + k] ** 2
         quarter = (2 if y * x1 > x * y1 else 0) + (1 if y * x2 > x * y2 else 0)
         found[10 + quarter] += root * work[RESIDUAL + k]
         found[14 + quarter] += root * root if work[LEVEL + k] >= white else 0.0
@@ -277,6 +292,7 @@ def _examine_quarters(p: Floats, n: int, white: float, work: Floats, found: Floa
     for quarter in range(4):
         found[10 + quarter] /= max(found[18 + quarter], 1.0) * max(abs(p[6]), 1e-9)
         found[14 + quarter] /= max(found[18 + quarter], 1.0)
+    found[22] = total / max(found[18] + found[19] + found[20] + found[21] - PARAMETERS, 1.0)
 
 
 @_exact
@@ -297,10 +313,10 @@ def _examine_opposites(p: Floats, n: int, work: Floats, found: Floats) -> None:
     gain = 1.0 + ((1 - right) ** 2 + right**2) * ((1 - down) ** 2 + down**2)
     unlike = beside = 0.0
     opposites = neighbours = 0
-    for place in range(SIDE * SIDE):
-        value = work[PLACED + place]
-        other = mirror - place
-        if not 0 <= other < SIDE * (SIDE - 1) - 1 or math.isnan(value):
+    for k in range(n):
+        place = (round(work[Y + k] + p[1]) - top) * SIDE + round(work[X + k] + p[0]) - left
+        value, other = work[PLACED + place], mirror - place
+        if math.isnan(value) or not 0 <= other < SIDE * (SIDE - 1) - 1:
             continue
         upper = (1 - right) * work[PLACED + other] + right * work[PLACED + other + 1]
         lower = (1 - right) * work[PLACED + other + SIDE] + right * work[PLACED + other + SIDE + 1]
@@ -313,7 +329,7 @@ def _examine_opposites(p: Floats, n: int, work: Floats, found: Floats) -> None:
             beside += step**2 / 2
             neighbours += 1
     # four parameters took their share of what is not alike on opposite sides: half of all freedoms
-    found[1] = unlike / max(opposites - 8, 1)
+    found[1] = unlike / (opposites - 8) if opposites > 40 else found[22]
     found[2] = beside / max(neighbours, 1)
 
 
@@ -325,6 +341,7 @@ def fit_corners(
     windows: Floats,
     tolerance: float,
     most_steps: int,
+    examine: bool,
     work: Floats,
     found: Floats,
 ) -> None:
@@ -335,8 +352,9 @@ def fit_corners(
     image : (height, width) uint16
     white : float
         Grey level from which on a pixel is saturated.
-    parameters : (n, 9)
-        In: where to begin. Out: x, y px, angle of edge 1, of edge 2 rad, s px, a, b grey levels, gx, gy 1/px.
+    parameters : (n, 11)
+        In: where to begin. Out: x, y px, angle of edge 1, of edge 2 rad, s px, a, b grey levels, and the gradients of a
+        and b, in x and y, per px.
     bends : (n, 2) 1/px
         Curvature of each edge.
     windows : (n, 4) px
@@ -344,27 +362,25 @@ def fit_corners(
     tolerance : float
         Of the position, px.
     most_steps : int
+    examine : bool
+        Whether all that is found is wanted, not only the status.
     work : (WORK_SIZE,)
         Room to work in.
-    found : (n, 22)
+    found : (n, 23)
         In: zeros. Out: status; variance of residuals, without what is alike on opposite sides of the corner; variance
         without what is alike in neighbouring pixels; the inverse normal matrix of x and y (xx, xy,
         yy); how x, then y, responds to each edge's bend, px per 1/px; for each quarter of the window its mean residual
-        over the amplitude, its share of saturated pixels, its weight. Quarters 0 and 3 are opposite each other.
+        over the amplitude, its share of saturated pixels, its weight (quarters 0 and 3 are opposite each other);
+        variance of residuals.
     """
     normal = np.empty((PARAMETERS + 1, PARAMETERS + 1))
     factor = np.empty((PARAMETERS, PARAMETERS))
-    vector = np.empty(PARAMETERS)
+    pulls = np.empty((PARAMETERS, 2))
+    step = np.empty(PARAMETERS)
     for c in range(len(parameters)):
         p, result = parameters[c], found[c]
-        status, n = _fit(
-            image, p, bends[c], windows[c], tolerance, most_steps, work, normal, factor, vector
-        )  # fmt: skip
-        result[0] = status
-        if status == CONVERGED:
-            result[6], result[7] = _respond(p, n, work, factor, 0, vector)
-            result[3], result[4] = vector[0], vector[1]
-            result[8], result[9] = _respond(p, n, work, factor, 1, vector)
-            result[5] = vector[1]
+        result[0], n = _fit(image, p, bends[c], windows[c], tolerance, most_steps, work, normal, factor, step)
+        if examine and result[0] == CONVERGED:
+            _examine_place(p, n, work, factor, pulls, step, result)
             _examine_quarters(p, n, white, work, result)
             _examine_opposites(p, n, work, result)
