@@ -16,7 +16,7 @@ __all__ = ["sides_seen"]
 AT = 0.18  # of a square: from the line where the outer squares should end, dark this far inside, white this far outside
 BEYOND = 0.35  # of a square: how far outside it is still white; margins are seldom narrower than half a square
 NEAR = 0.3  # of the contrast, that counts as dark or white still
-FEWEST_TELLING = 3  # dark squares that end where they should, while the board would go on
+FEWEST_TELLING = 2  # dark squares that end where they should, while the board would go on
 
 
 def sides_seen(grey: NDArray[np.float32], grid: Floats) -> tuple[bool, bool, bool, bool]:
