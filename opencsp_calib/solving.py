@@ -12,12 +12,10 @@ from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.models import lens_model
-from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.schur import factorise
 
-__all__ = ["ABILITIES", "check_request", "finished", "remaining_sigmas"]
+__all__ = ["ABILITIES", "check_request", "finished"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -27,9 +25,9 @@ ABILITIES = {
     "weights": "weight corners by their covariance",
     "robust": "leave out outlying corners",
 }
-SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this
 MIN_VIEWS = 2  # of a flat board; one view of a plane does not determine a camera
 MIN_CORNERS = 4  # of one view, not on one line
+SHORTEST_FOCAL = 0.05  # of the image's longer side: a fisheye that sees all around has 0.16
 
 
 def check_request(solver: Solver, observations: Observations, model: str, options: SolveOptions) -> None:
@@ -108,15 +106,16 @@ def finished(
     Raises
     ------
     CalibrationFailedError
-        If a number is not finite, a focal length not positive, the principal point further outside of the image than
-        the image is large, or a used corner has no image: behind the camera, or where the lens model folds back.
+        If a number is not finite, a focal length is shorter than any lens's, the principal point is further outside
+        of the image than the image is large, or a used corner has no image: behind the camera, or where the lens model
+        folds back.
     """
     engine = f"{solver.name} {solver.version()}"
     advice = "check the board's description and the photographs, add tilted views or take a simpler model"
     numbers = np.concatenate([params, np.ravel(rotations), np.ravel(translations)])
-    if not np.isfinite(numbers).all() or not (params[:2] > 0).all():
-        raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {advice}")
     size = np.array(observations.image_size)
+    if not np.isfinite(numbers).all() or not (params[:2] > SHORTEST_FOCAL * size.max()).all():
+        raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {advice}")
     if (np.abs(params[2:4] - size / 2) > 1.5 * size).any():
         x, y = params[2:4]
         message = f"{engine} puts the principal point at ({x:.0f}, {y:.0f}), far outside of the image: {advice}"
@@ -140,34 +139,6 @@ def finished(
                 f"or where {model!r} folds back; {advice}"
             )
     return calibration
-
-
-def remaining_sigmas(calibration: Calibration) -> float:
-    """How far a camera is from the least sum of squares: the length of its next Newton step, in sigmas.
-
-    Zero where the gradient vanishes; infinite where the observations do not determine the camera. For a flat or free
-    board; a warp's unknowns are each solver's own.
-
-    Parameters
-    ----------
-    calibration : Calibration
-        Of any solver that minimises the sum of squares that its options ask for.
-    """
-    equations = normal_equations(calibration)
-    gradients = (
-        equations.shared_gradient.sum(axis=0)[:, None],
-        equations.corner_gradient.sum(axis=0)[:, :, None],
-        equations.pose_gradient[:, :, None],
-    )
-    try:
-        factor = factorise(equations)
-    except np.linalg.LinAlgError:
-        return np.inf
-    step = factor.solve(*gradients)[0][:, 0]
-    variance = equations.cost / max(equations.dof, 1)
-    if calibration.options.weights == "equal":
-        variance = max(variance, SMALLEST_NOISE_PX**2)
-    return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
 
 
 def _on_one_line(points: Points) -> bool:

@@ -7,12 +7,13 @@ import pytest
 from solver_worlds import SEED_BOARD, seed_world
 
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.convergence import judged, remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.solving import check_request, finished, remaining_sigmas
+from opencsp_calib.solving import check_request, finished
 
 
 class Engine:
@@ -131,6 +132,14 @@ def test_remaining_sigmas_are_infinite_where_nothing_is_determined():
     pinhole = replace(CAMERA, model="pinhole", params=CAMERA.params[:4])
     calibration = Calibration(pinhole, seen, head_on, SEED_BOARD, "", SolveOptions())
     assert remaining_sigmas(calibration) > 1e3  # to rounding
+    with pytest.raises(CalibrationFailedError, match="4 views do not determine the"):
+        judged(calibration)
+
+
+def test_a_solution_that_stops_short_is_said_to():
+    assert judged(exact(CAMERA.params)).problems == ()
+    short = judged(exact(CAMERA.params + np.eye(8)[0] * 0.3))
+    assert [problem.code for problem in short.problems] == ["not-converged"]
 
 
 def test_a_board_is_laid_on_the_given_one_and_shows_the_same():

@@ -27,11 +27,11 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import compare, pixel_grid
 from opencsp_calib.conformance.worlds import camera_of
+from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.registry import installed
-from opencsp_calib.solving import remaining_sigmas
 from opencsp_calib.synthetic import demo_camera, observe, random_poses, seed_poses
 
 BOARD = Checkerboard(22, 19, 0.05)
@@ -82,9 +82,8 @@ def unaligned_px(a: Camera, b: Camera) -> float:
 
 def exact() -> None:
     """Print how far from the truth solvers end that are given it."""
-    print(
-        "## From exact pixels\n\n| world | model | solver | worst px | worst px, aligned | rms px |\n|---|---|---|---|---|---|"
-    )
+    print("## From exact pixels\n")
+    print("| world | model | solver | worst px | worst px, aligned | rms px |\n|---|---|---|---|---|---|")
     worlds = [("seed's", "opencv4", seed_world(50, 0.0))]
     worlds += [("wide", model, wide_world(model, 0.0)) for model in ("pinhole", "opencv5", "opencv8", "opencv12")]
     worlds += [("wide", model, wide_world(model, 0.0)) for model in ("opencv14", "opencv_fisheye")]

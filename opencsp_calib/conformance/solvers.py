@@ -16,12 +16,13 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import compare
 from opencsp_calib.conformance.kit import Promise, Setup, promise
 from opencsp_calib.conformance.worlds import BOARD, VIEWS, World, edited, main_model, world
+from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.options import SolveOptions
-from opencsp_calib.solving import ABILITIES, remaining_sigmas
+from opencsp_calib.solving import ABILITIES
 
 __all__ = ["CHECKS", "EXACT_PX", "found", "model_checks"]
 
@@ -162,10 +163,11 @@ def fails_with_a_clear_line(solver: Solver, setup: Setup) -> None:
         "one view": views[:1],
         "three corners a view": edited(plain.observations, lambda _, seen: _first(seen, 3)).views,
         "corners on one line": edited(plain.observations, lambda _, seen: _first(seen, BOARD.columns)).views,
+        "all views head-on": world(plain.camera.model, tilt_deg=(0.0, 0.0)).observations.views,
         "nonsense": edited(plain.observations, _nonsense).views,
         "one view three times": same,
     }
-    certain = ("no view", "one view", "three corners a view", "corners on one line")
+    certain = ("no view", "one view", "three corners a view", "corners on one line", "all views head-on")
     for what, chosen in hopeless.items():
         try:
             calibration = solver.solve(replace(plain.observations, views=chosen), plain.camera.model, SolveOptions())

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, Points
+from opencsp_calib.convergence import judged
 from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
 from opencsp_calib.initial import initial_camera, initial_poses
 from opencsp_calib.solving import check_request, finished
@@ -68,7 +69,7 @@ class ColmapSolver:
             translations = translations * unit
         calibration = finished(self, observations, model, options, params, rotations, translations, board=board)
         _check_in_front(calibration)
-        return calibration
+        return judged(calibration)
 
 
 def _scene(

@@ -7,13 +7,14 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from opencsp_calib import CalibrationFailedError, InputError, Observations, Problem, SolveOptions
+from opencsp_calib import CalibrationFailedError, InputError, Observations, SolveOptions
 from opencsp_calib.arrays import Floats, Params
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.convergence import judged
 from opencsp_calib.images import opencv_on_one_thread
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
-from opencsp_calib.solving import check_request, finished, remaining_sigmas
+from opencsp_calib.solving import check_request, finished
 from opencsp_calib_opencv.available import missing_opencv
 
 __all__ = ["OpenCVSolver"]
@@ -22,9 +23,6 @@ ITERATIONS = 300
 SMALLEST_STEP = 2.3e-16
 """OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
 up to 1e-8 px short. It has no test of the gradient."""
-
-CONVERGED_SIGMAS = 0.1
-"""Pixels in single precision leave some 0.01 sigmas; with opencv8 and richer models OpenCV may stop far short."""
 
 Solution: TypeAlias = tuple[Params, Floats, Floats]  # of the lens model; rotations and translations (V, 3)
 
@@ -57,9 +55,7 @@ class OpenCVSolver:
         engine = _solve_fisheye if model == "opencv_fisheye" else _solve_pinhole
         with opencv_on_one_thread():  # with more, OpenCV's sums, and so its results, differ from run to run
             solution = engine(observations, model, options)
-        calibration = finished(self, observations, model, options, *solution)
-        remaining = remaining_sigmas(calibration)
-        return calibration if remaining < CONVERGED_SIGMAS else calibration.with_problems(_stopped_short(remaining))
+        return judged(finished(self, observations, model, options, *solution))
 
 
 def _solve_pinhole(observations: Observations, model: str, options: SolveOptions) -> Solution:
@@ -103,14 +99,6 @@ def _solve_fisheye(observations: Observations, model: str, options: SolveOptions
             criteria=_criteria(cv2),
         )
     return _unpacked(observations, matrix, np.ravel(distortion), rotations, translations)
-
-
-def _stopped_short(remaining: float) -> Problem:
-    message = (
-        f"OpenCV's iteration ended {remaining:.2g} sigmas short of the least sum of squares, without saying so; take "
-        "another solver or a simpler lens model"
-    )
-    return Problem("not-converged", message)
 
 
 def _coefficient_flags(cv2: ModuleType, count: int) -> int:

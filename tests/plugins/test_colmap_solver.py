@@ -7,12 +7,12 @@ from opencsp_calib_colmap.solver import ColmapSolver
 from solver_worlds import SEED_BOARD, seed_world, worst_px
 
 from opencsp_calib.camera import Camera
+from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.solving import remaining_sigmas
 
 pycolmap = pytest.importorskip("pycolmap")
 

@@ -10,10 +10,10 @@ from solver_worlds import SEED_BOARD, sandia, seed_world, worst_px
 
 from opencsp_calib.board import Checkerboard
 from opencsp_calib.camera import Camera
+from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.options import SolveOptions
-from opencsp_calib.solving import remaining_sigmas
 from opencsp_calib.synthetic import observe, random_poses
 
 
