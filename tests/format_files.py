@@ -3,6 +3,8 @@
 import json
 from collections.abc import Mapping
 
+from format_files_calibration import FILES as OF_CALIBRATION
+
 __all__ = ["FILES"]
 
 
@@ -361,5 +363,6 @@ FILES: Mapping[str, Mapping[str, bytes]] = {
     "halcon": {"campar.dat": HALCON},
     "tsai": {"camera.tsai": TSAI},
     "openmvg": {"sfm_data.json": _json(OPENMVG)},
+    **OF_CALIBRATION,
 }
 """By format, then by file name."""

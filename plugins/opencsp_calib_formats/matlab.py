@@ -143,10 +143,15 @@ def _imported(name: str, fields: Fields) -> Imported:
 
 
 def _image_size(fields: Fields) -> tuple[int, int] | None:
-    if "ImageSize" not in fields or not np.size(fields.raw("ImageSize")):
+    if _is_empty(fields.values.get("ImageSize")):
         return None
     rows, columns = (whole(side, fields.path("ImageSize")) for side in fields.numbers("ImageSize", 2))
     return columns, rows
+
+
+def _is_empty(value: Any) -> bool:
+    """Whether there is nothing: no field, or MATLAB's ``[]``."""
+    return value is None or (value.size == 0 if isinstance(value, np.ndarray) else value == [])
 
 
 def _matrix(fields: Fields) -> Floats:
@@ -155,7 +160,7 @@ def _matrix(fields: Fields) -> Floats:
     if key is None:
         fx, fy = fields.numbers("FocalLength", 1, 2)[[0, -1]]
         cx, cy = fields.numbers("PrincipalPoint", 2)
-        skew = fields.numbers("Skew", 1)[0] if np.size(fields.values.get("Skew", ())) else 0.0
+        skew = 0.0 if _is_empty(fields.values.get("Skew")) else fields.numbers("Skew", 1)[0]
         return np.array([[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     found = fields.matrix(key, 3, 3) if isinstance(fields.raw(key), list) else fields.numbers(key, 9).reshape(3, 3)
     upright, turned = (found[2] == (0, 0, 1)).all(), (found[:, 2] == (0, 0, 1)).all()

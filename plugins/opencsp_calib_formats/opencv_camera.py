@@ -12,7 +12,7 @@ from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib.models import lens_model
 
-__all__ = ["MODEL_OF_COUNT", "carried", "either_model", "opencv_camera", "params_of", "through_matrix"]
+__all__ = ["MODEL_OF_COUNT", "carried", "either_model", "opencv_camera", "through_matrix"]
 
 MODEL_OF_COUNT = {0: "pinhole", 4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
 
@@ -87,13 +87,6 @@ def through_matrix(model: str, coefficients: Params, matrix: Floats) -> Callable
         return np.asarray(lens.project(points, normalised) @ matrix[:2, :2].T + matrix[:2, 2], dtype=np.float64)
 
     return project
-
-
-def params_of(path: Path, model: str, params: Params, carried: tuple[str, ...], title: str) -> Params:
-    """The distortion coefficients to write, if the format carries the model; InputError otherwise."""
-    if model not in carried:
-        raise InputError(f"cannot write {path}: {title} does not carry {model}, only {', '.join(carried)}")
-    return params[4:]
 
 
 def carried(camera: Camera, models: tuple[str, ...], path: Path, title: str) -> tuple[str, Params]:
