@@ -3,8 +3,11 @@
 Levenberg-Marquardt on six unknowns, from the linear solution and from its mirror image: seen from afar, a flat board
 tilted towards the camera looks almost like one tilted away from it, each is a minimum of its own, and noise decides
 next to which of them the linear solution lies (the two-fold ambiguity of planar poses; Schweighofer and Pinz, "Robust
-pose estimation from a planar target", PAMI 2006).
+pose estimation from a planar target", PAMI 2006). Where the board is so small or far that its perspective hardly shows
+in the noise, the linear solution may be wrong in any way, and a few more starts are tried.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,6 +25,8 @@ __all__ = ["fit_pose", "pose_residuals"]
 
 MIN_CORNERS = 4
 ON_A_LINE = 1e-6  # width of a set of corners, in parts of its length, below which a pose cannot be told
+CLEAR = 30.0  # times the residuals: perspective that shows by more cannot be mistaken
+TILT = 0.7  # rad, of the starts tried where it is not clear: between head-on and grazing
 MAX_STEPS = 100
 MAX_DAMPING = 1e8
 SMALL_GAIN = (
@@ -62,11 +67,15 @@ def fit_pose(camera: Camera, board: Board, detection: Detection) -> Pose:
     view = Observations(board, camera.image_size, (View("", detection, "used"),))
     (start,) = initial_poses(camera, view)
     at = start.transform(middle[None])[0]
-    found = [
-        _refined(camera, points - middle, detection.pixels, rotation, at)
-        for rotation in (start.matrix, _mirrored(start.matrix, at))
-    ]
-    cost, rotation, at = min(found, key=lambda candidate: candidate[0])
+
+    def refined(starts: Sequence[Matrix]) -> tuple[float, Matrix, Vector]:
+        tried = (_refined(camera, points - middle, detection.pixels, rotation, at) for rotation in starts)
+        return min(tried, key=lambda candidate: candidate[0])
+
+    best = refined((start.matrix, _mirrored(start.matrix, at)))
+    if not _perspective_px(points - middle, detection.pixels, best[2]) > CLEAR * np.sqrt(best[0]):
+        best = min(best, refined(_tilted(start.matrix, at)), key=lambda candidate: candidate[0])
+    cost, rotation, at = best
     if not np.isfinite(cost):
         raise CalibrationFailedError(
             f"no pose of the board explains its {len(points)} corners: the camera or the board's description is wrong"
@@ -88,6 +97,24 @@ def _mirrored(rotation: Matrix, at: Vector) -> Matrix:
     sight = at / np.linalg.norm(at)
     first, second = (rotation - 2.0 * np.outer(sight, sight @ rotation)).T[:2]
     return np.column_stack([first, second, np.cross(first, second)])
+
+
+def _tilted(rotation: Matrix, at: Vector) -> tuple[Matrix, ...]:
+    """Rotations turned about the line of sight as the given one, but tilted to each of four sides."""
+    sight = at / np.linalg.norm(at)
+    normal = rotation[:, 2] * np.sign(rotation[:, 2] @ sight)
+    across = np.cross(normal, sight)
+    angle = np.arctan2(np.linalg.norm(across), normal @ sight)
+    level = Rotation.from_rotvec(across / max(np.linalg.norm(across), 1e-12) * angle).as_matrix() @ rotation
+    return tuple(
+        Rotation.from_rotvec(sign * TILT * level[:, axis]).as_matrix() @ level for axis in (0, 1) for sign in (1, -1)
+    )
+
+
+def _perspective_px(points: Points, pixels: Pixels, at: Vector) -> float:
+    """By about how much perspective bends the image of points, (n, 3) about their middle, that are well tilted."""
+    spread = np.linalg.norm(pixels - pixels.mean(axis=0), axis=1).max()
+    return float(spread * np.linalg.norm(points, axis=1).max() / np.linalg.norm(at))
 
 
 def _refined(

@@ -27,7 +27,7 @@ def solve(observations: Observations) -> Calibration:
     return BundleSolver().solve(observations, "opencv4", SolveOptions())
 
 
-def photographed(views: int = 20, noise_px: float = 0.05, seed: int = 1) -> Observations:
+def photographed(views: int = 14, noise_px: float = 0.05, seed: int = 1) -> Observations:
     return observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, views, seed), noise_px=noise_px, rng=seed)
 
 
@@ -40,14 +40,15 @@ def changed(**change: float) -> Camera:
 
 def test_the_true_camera_is_ok() -> None:
     """Two sigmas of an rms over the image: by chance a few in a hundred fall outside."""
-    verdicts = [check(CAMERA, photographed(seed=seed), solve).verdict for seed in range(8)]
-    assert verdicts.count("ok") >= 6
+    verdicts = [check(CAMERA, photographed(seed=seed), solve).verdict for seed in range(6)]
+    assert verdicts.count("ok") >= 5
     assert "wrong" not in verdicts
 
 
 def test_a_turn_of_the_frame_is_no_change() -> None:
     """The true camera but for its principal point, moved by a third of a pixel: a turn, to second order."""
-    assert check(changed(cx=0.3), photographed(noise_px=0.2), solve).verdict == "ok"
+    verdicts = [check(changed(cx=0.3), photographed(noise_px=0.2, seed=seed), solve).verdict for seed in range(3)]
+    assert verdicts.count("ok") >= 2  # by chance, a few in a hundred are not
 
 
 @pytest.mark.parametrize("change", [{"fx": 13.5, "fy": 13.5}, {"k1": 0.02}, {"fx": 10.0}], ids=str)

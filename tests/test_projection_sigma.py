@@ -40,13 +40,13 @@ def test_is_what_comparing_cameras_drawn_from_the_covariance_shows(
     grid = (7, 5)
     predicted = sigma_map(calibration, range_m, grid=grid)
     squares = []
-    for draw in rng.multivariate_normal(calibration.camera.params, calibration.covariance, 80, method="eigh"):
+    for draw in rng.multivariate_normal(calibration.camera.params, calibration.covariance, 50, method="eigh"):
         other = replace(calibration.camera, params=draw)
         squares.append(compare(calibration.camera, other, range_m=range_m, grid=grid).length_px ** 2)
     scatter = np.sqrt(np.mean(squares, axis=0))
-    # 80 draws of two components know a sigma to 6 to 8 %
-    assert np.median(predicted.sigma_px / scatter) == pytest.approx(1.0, abs=0.12)
-    assert (predicted.sigma_px / scatter) == pytest.approx(np.ones_like(scatter), abs=0.35)
+    # 50 draws of two components know a sigma to 7 to 10 %
+    assert np.median(predicted.sigma_px / scatter) == pytest.approx(1.0, abs=0.15)
+    assert (predicted.sigma_px / scatter) == pytest.approx(np.ones_like(scatter), abs=0.4)
     assert predicted.rms_px == pytest.approx(np.sqrt(np.mean(squares)), rel=0.2)
 
 

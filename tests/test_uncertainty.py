@@ -55,15 +55,16 @@ def test_one_newton_step_finds_what_solving_again_without_each_view_finds(way: s
 
 @pytest.mark.parametrize("way", ["flat", "free"])
 def test_the_residual_covariance_is_the_scatter_of_worlds_whose_noise_is_independent(way: str) -> None:
-    poses = seed_poses(BOARD, CAMERA, 10, 3)
+    board = Checkerboard(6, 5, 0.1)
+    poses = seed_poses(board, CAMERA, 8, 3)
     params, sigmas = [], []
-    for seed in range(30):
-        result = with_uncertainty(solved(observe(CAMERA, BOARD, poses, noise_px=0.1, rng=seed), WAYS[way]))
+    for seed in range(25):
+        result = with_uncertainty(solved(observe(CAMERA, board, poses, noise_px=0.1, rng=seed), WAYS[way]))
         params.append(result.camera.params)
         sigmas.append(np.sqrt(np.diag(result.covariance_residual)))
     scatter = np.sqrt(np.mean((np.array(params) - CAMERA.params) ** 2, axis=0))
-    # the scatter of 30 worlds is known to 13 %, one sigma; eight parameters
-    assert scatter / np.mean(sigmas, axis=0) == pytest.approx(np.ones(8), abs=0.4)
+    # the scatter of 25 worlds is known to 14 %, one sigma; eight parameters
+    assert scatter / np.mean(sigmas, axis=0) == pytest.approx(np.ones(8), abs=0.42)
 
 
 def test_is_the_dense_inverse_with_poses_marginalised(observations: Observations) -> None:
@@ -124,9 +125,9 @@ def test_the_larger_covariance_is_below_neither_in_any_direction(seed: int, rank
 
 
 def test_is_honest_where_boards_flex_and_the_residual_sigma_is_not() -> None:
-    """Student's t times sigma holds 95 %: of 30 worlds x 8 parameters, correlated within a world."""
+    """Student's t times sigma holds 95 %: of 24 worlds x 8 parameters, correlated within a world."""
     honest, naive = [], []
-    for seed in range(30):
+    for seed in range(24):
         poses = seed_poses(BOARD, CAMERA, 10, seed)
         result = with_uncertainty(solved(observe(CAMERA, BOARD, poses, noise_px=0.03, rng=seed, flex_m=3e-4)))
         off = np.abs(result.camera.params - CAMERA.params) / student_factor(10)
@@ -161,7 +162,7 @@ def test_a_view_that_the_result_hangs_on_is_named() -> None:
 
 def test_a_good_set_hangs_on_no_view() -> None:
     hanging = 0
-    for seed in range(10):
+    for seed in range(6):
         seen = observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, 20, seed), noise_px=0.05, rng=seed)
         hanging += any(p.code == "hangs-on-view" for p in with_uncertainty(solved(seen)).problems)
     assert hanging == 0
