@@ -14,7 +14,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.quality import SetQuality, ViewQuality, set_quality, view_qualities
 
-__all__ = ["Verdict", "fold_inside", "judge", "verdict"]
+__all__ = ["REMARKS", "Verdict", "fold_inside", "judge", "verdict"]
 
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
@@ -153,8 +153,9 @@ def _aspect(calibration: Calibration) -> Problem | None:
     if not (sigma > 0 and abs(fx - fy) > ASPECT_SIGMAS * sigma):
         return None
     message = (
-        f"fx and fy differ by {fx - fy:+.2f} px, {abs(fx - fy) / sigma:.0f} times its standard deviation; most sensors "
-        "have square pixels, so the board's spacing may differ in x and y: solve for the board's shape, or measure it"
+        f"fx and fy differ by {fx - fy:+.2f} px, which is known to {sigma:.2g} px (they are known together, not one by "
+        "one); most sensors have square pixels, so the board's spacing may differ in x and y: solve for its shape, or "
+        "measure it"
     )
     return Problem("fx-fy-differ", message)
 

@@ -58,7 +58,10 @@ class Registry:
         kind = spec.partition(":")[0]
         if kind not in self.boards:
             grammars = " or ".join(board.grammar for board in self.boards.values())
-            raise BoardSpecError(f"{spec!r} does not describe a board; write {grammars}, or the name of a board file")
+            raise BoardSpecError(
+                f"{spec!r} does not describe a board; write {grammars}, such as checkerboard:18x23:50mm, or the name "
+                "of a board file"
+            )
         return self.boards[kind].parse(spec)
 
     def detector_for(self, board: Board) -> Detector:

@@ -80,8 +80,9 @@ def parameter_lines(
     sigmas = [math.nan] * len(names) if sigma is None else list(sigma)
     lines = []
     for name, value, one in zip(names, camera.params, sigmas, strict=True):
-        digits = 3 if name in ("fx", "fy", "cx", "cy") else 6
-        unit = " px" if digits == 3 else ""
+        in_pixels = name in ("fx", "fy", "cx", "cy")
+        known_to = 1 - math.floor(math.log10(one)) if math.isfinite(one) and one > 0 else 0  # two digits of the sigma
+        digits, unit = (max(3, known_to), " px") if in_pixels else (max(6, known_to), "")
         known = f"{one:.{digits}f}{unit}" if math.isfinite(one) else ""
         lines.append((name, f"{value:.{digits}f}{unit}", known))
     return lines + _in_millimetres(camera, record)

@@ -130,6 +130,6 @@ def _say_validation(found: "Validation") -> None:
         for pair in found.pairs
     ]
     say_table(("difference over the image", "rms", "worst"), differences)
-    say(f"verdict: {found.verdict}")
+    say(f"verdict: the solvers {found.verdict}; what else there is to know:")
     for reason in found.reasons[:MAX_SHOWN]:
         say(f"- {reason}")

@@ -24,6 +24,9 @@ __all__ = [
 ]
 
 
+MAX_NAMED = 8  # images in one line
+
+
 def say(text: str) -> None:
     """A line for people."""
     _console().print(text)
@@ -36,9 +39,11 @@ def complain(text: str) -> None:
 
 
 def say_problems(problems: "tuple[Problem, ...]") -> None:
-    """Warnings, each on a line with its code."""
+    """Warnings, each on a line with its code; decisions that are only told are notes."""
+    from opencsp_calib.judgement import REMARKS
+
     for problem in problems:
-        say(f"warning [{problem.code}] {problem.message}")
+        say(f"{'note' if problem.code in REMARKS else 'warning'} [{problem.code}] {problem.message}")
 
 
 def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
@@ -80,11 +85,15 @@ def detection_progress() -> "Iterator[Progress]":
 
 
 def say_unused(observations: "Observations") -> None:
-    """The images that take no part, each with its reason."""
+    """The images that take no part, and why; those of one reason in one line."""
+    by_reason: dict[tuple[str, str], list[str]] = {}
     for view in observations.views:
         if view.status != "used":
             reason = view.problems[-1].message if view.problems else view.detection.reason
-            say(f"{view.image}: {view.status}: {reason}")
+            by_reason.setdefault((view.status, reason), []).append(view.image)
+    for (status, reason), images in by_reason.items():
+        more = f" and {len(images) - MAX_NAMED} more" if len(images) > MAX_NAMED else ""
+        say(f"{', '.join(images[:MAX_NAMED])}{more}: {status}: {reason}")
 
 
 def _console() -> "Console":

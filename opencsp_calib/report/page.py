@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.judgement import Verdict, judge, verdict
+from opencsp_calib.judgement import REMARKS, Verdict, judge, verdict
 from opencsp_calib.quality import set_quality, view_qualities
 from opencsp_calib.report import plots
 from opencsp_calib.report.board_section import board_section
@@ -66,13 +66,17 @@ def _summary(calibration: Calibration) -> str:
         (f"{whole.tilts_deg[0]:.0f}–{whole.tilts_deg[2]:.0f}°", f"tilt, median {whole.tilts_deg[1]:.0f}°"),
         (f"{whole.ranges_m[0]:.2f}–{whole.ranges_m[2]:.2f} m", "range"),
         (f"{whole.horizontal} / {whole.vertical}", "boards horizontal / vertical"),
-        (calibration.options.board_shape, f"board shape, {calibration.board.spec}"),
+        (calibration.options.board_shape, "board shape"),
     )
     cards = "".join(f"<div><b>{escape(value)}</b>{escape(what)}</div>" for value, what in facts)
-    warnings = "".join(f"<li><code>{escape(p.code)}</code> {escape(p.message)}</li>" for p in problems)
+    warnings = "".join(
+        f"<li{' class=quiet' if p.code in REMARKS else ''}><code>{escape(p.code)}</code> {escape(p.message)}</li>"
+        for p in problems
+    )
     return (
         f"<h1>{escape(camera.name)}</h1>"
-        f'<div class="subtitle">{escape(camera.model)}, {size} px, solved by {escape(calibration.solver)}</div>'
+        f'<div class="subtitle">{escape(camera.model)}, {size} px, {escape(calibration.board.spec)}, '
+        f"solved by {escape(calibration.solver)}</div>"
         f'<div class="verdict {judged.level}">{escape(judged.sentence)}</div>'
         + (f'<ul class="warnings">{warnings}</ul>' if warnings else "")
         + f'<div class="facts">{cards}</div>'
