@@ -11,7 +11,7 @@ import pytest
 from worlds import SmallWorld
 
 import opencsp_calib
-from opencsp_calib import Calibration, Checkerboard, InputError, Observations, calibrate, compare, detect, solve
+from opencsp_calib import Calibration, Checkerboard, InputError, Observations, calibrate, detect, solve
 from opencsp_calib.dropping import drop_above, drop_worst, excluding
 from opencsp_calib.errors import CancelledError
 from opencsp_calib.synthetic import observe
