@@ -26,7 +26,7 @@ GRID = (40, 30)
 """Columns and rows of pixels at which cameras are compared."""
 MAX_STEPS = 200
 MAX_DAMPING = 1e6
-SMALL_GAIN = 1e-15  # of the cost, by a step: less is rounding
+SMALL_GAIN = 1e-15  # of the cost: where a step promises less, the rest is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,32 +183,40 @@ def _fit_frame(
     rotation, offset = start, np.zeros(3)
     moved = points @ rotation.T
     error = camera.project(moved) - pixels
-    used = np.isfinite(error).all(axis=1)
+    used = np.asarray(np.isfinite(error).all(axis=1))
     damping = 1e-6
     for _ in range(MAX_STEPS):
-        step = _frame_step(camera, moved[used], error[used], damping, shifted=shifted)
-        new_rotation = Rotation.from_rotvec(step[:3]).as_matrix() @ rotation
-        new_offset = Rotation.from_rotvec(step[:3]).apply(offset) + (step[3:] if shifted else 0.0)
+        step, promised = _frame_step(camera, moved[used], error[used], damping, shifted=shifted)
+        if promised <= SMALL_GAIN * _cost(error, used) or damping > MAX_DAMPING:
+            break
+        turn = Rotation.from_rotvec(step[:3])
+        new_rotation = turn.as_matrix() @ rotation
+        new_offset = turn.apply(offset) + (step[3:] if shifted else 0.0)
         new_moved = points @ new_rotation.T + new_offset
         new_error = camera.project(new_moved) - pixels
         both = np.asarray(used & np.isfinite(new_error).all(axis=1))
-        cost, gain = _cost(error, both), _cost(error, both) - _cost(new_error, both)
-        if gain > 0:
+        if _cost(new_error, both) < _cost(error, both):
             rotation, offset, moved, error, used = new_rotation, new_offset, new_moved, new_error, both
-        damping = max(damping * 0.1, 1e-12) if gain > 0 else damping * 10.0
-        if abs(gain) <= SMALL_GAIN * cost or damping > MAX_DAMPING:
-            break
+            damping = max(damping * 0.1, 1e-12)
+        else:
+            damping *= 10.0
     return rotation, offset
 
 
-def _frame_step(camera: Camera, points: Points, error: Pixels, damping: float, *, shifted: bool) -> Floats:
-    """(3,) or (6,) the damped step; by QR, since over a narrow image a turn and a shift are almost the same."""
+def _frame_step(
+    camera: Camera, points: Points, error: Pixels, damping: float, *, shifted: bool
+) -> tuple[Floats, float]:
+    """(3,) or (6,) the damped step, and by how much the cost should fall.
+
+    By QR, since over a narrow image a turn and a shift are almost the same.
+    """
     _, by_point, _ = camera.lens.project_with_jacobians(points, camera.params)
     jacobian = frame_jacobian(by_point, points, shifted=shifted).reshape(error.size, -1)
     scale = np.linalg.norm(jacobian, axis=0)
     scaled = np.vstack([jacobian / scale, np.sqrt(damping) * np.eye(len(scale))])
     right = np.concatenate([-error.ravel(), np.zeros(len(scale))])
-    return np.asarray(np.linalg.lstsq(scaled, right, rcond=None)[0] / scale, dtype=np.float64)
+    step = np.linalg.lstsq(scaled, right, rcond=None)[0] / scale
+    return step, float(-(jacobian.T @ error.ravel()) @ step)
 
 
 def _cost(error: Pixels, used: Mask) -> float:

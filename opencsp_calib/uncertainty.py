@@ -96,7 +96,8 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
         return calibration.with_problems(unknown)
     honest = larger(residual, jackknife_covariance(steps), equations.unknowns.camera)
     calibration = replace(calibration, covariance=honest)
-    hangs = _hangs_on(calibration, _influence(calibration, steps))
+    jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
+    hangs = _hangs_on(calibration, _influence(calibration, steps, jacobian), jacobian)
     return calibration.with_problems(*hangs)
 
 
@@ -110,7 +111,8 @@ def influence(calibration: Calibration) -> tuple[Influence, ...]:
     numpy.linalg.LinAlgError
         If all views together do not determine it: `with_uncertainty` has said so.
     """
-    return _influence(calibration, camera_without_each_view(normal_equations(calibration)))
+    steps = camera_without_each_view(normal_equations(calibration))
+    return _influence(calibration, steps, Alignment.at_infinity(calibration.camera).grid_jacobian)
 
 
 def student_factor(views: int, confidence: float = 0.95) -> float:
@@ -154,8 +156,7 @@ def _why_unknown(calibration: Calibration, steps: Floats) -> Problem | None:
     return Problem("uncertainty-unknown", message)
 
 
-def _influence(calibration: Calibration, steps: Floats) -> tuple[Influence, ...]:
-    jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
+def _influence(calibration: Calibration, steps: Floats, jacobian: Floats) -> tuple[Influence, ...]:
     lengths = np.linalg.norm(jacobian @ steps.T, axis=1)  # (N, V) px
     squares = (lengths**2).mean(axis=0)
     total = squares.sum()
@@ -167,14 +168,13 @@ def _influence(calibration: Calibration, steps: Floats) -> tuple[Influence, ...]
     )
 
 
-def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...]) -> tuple[Problem, ...]:
+def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...], jacobian: Floats) -> tuple[Problem, ...]:
     """A view that moves the camera farther than all others together, and farther than the residuals explain.
 
     More than half of the jackknife variance is then one number squared: it has hardly more than one degree of
     freedom, whatever the number of views, so that even the honest sigma cannot be relied on.
     """
     most = max(influences, key=lambda i: i.share)
-    jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
     explained = np.einsum("nij,jk,nik->n", jacobian, calibration.covariance_residual, jacobian).mean()
     if not (most.share > 0.5 and most.shift_rms_px**2 > explained):
         return ()
