@@ -99,7 +99,9 @@ def compare(a: Camera, b: Camera, *, range_m: float | None = None, grid: tuple[i
         Of the same image size; the lens models may differ.
     range_m : float, optional
         Compare what is seen at this distance from camera `a`, and let the frames differ by a translation too; by
-        default at infinity, where only a rotation matters.
+        default at infinity, where only a rotation matters. A pixel does not tell how far away a thing is, so that all
+        finite ranges give the same shift over the image, and a translation in proportion; since it makes up for most of
+        a difference in focal length, cameras differ less at a finite range than at infinity.
     grid : (int, int)
         Columns and rows of the pixels compared, spread evenly from corner to corner.
 

@@ -125,6 +125,13 @@ def test_what_a_translation_can_explain_is_not_a_difference_at_that_range() -> N
     assert compare(CAMERA, other, range_m=2.0).rms_px < 0.1 * compare(CAMERA, other).rms_px
 
 
+def test_finite_ranges_differ_by_nothing_but_the_translation() -> None:
+    other = changed(CAMERA, fx=8.0, cx=3.0, k1=0.01)
+    near, far = compare(CAMERA, other, range_m=1.0), compare(CAMERA, other, range_m=50.0)
+    assert near.shift == pytest.approx(far.shift, abs=1e-6)
+    assert near.translation * 50 == pytest.approx(far.translation, rel=1e-4)
+
+
 @pytest.mark.parametrize("range_m", [0.0, -1.0, np.nan, np.inf])
 def test_an_impossible_range_is_refused(range_m: float) -> None:
     with pytest.raises(InputError, match="range"):
