@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from opencsp_calib.errors import FileFormatError
+from opencsp_calib_formats.mat_v5 import Opaque
 
 __all__ = ["read_mat_hdf5"]
 
@@ -72,6 +73,8 @@ class _Walk:
             return np.zeros((0, 0))
         if entry.size > MAX_VALUES or entry.external or math.prod(entry.chunks or ()) > MAX_CHUNK:
             return None
+        if self._attribute(entry, "MATLAB_object_decode"):
+            return Opaque(entry.name.strip("/"), "", None)
         if self._h5py.check_ref_dtype(entry.dtype) is not None:
             file = entry.file
             return [self._entry(file[reference], depth + 1) for reference in np.ravel(entry[()]) if reference]

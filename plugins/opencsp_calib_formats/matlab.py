@@ -118,7 +118,8 @@ def _named(cameras: Mapping[str, Fields], content: Any) -> dict[str, Fields]:
     names = {}
     for key, fields in cameras.items():
         last = key.rpartition(".")[2]
-        own = key if key not in inside else variable if last.isdecimal() else f"{variable}.{last}"
+        own = f"{variable}.{last}" if last.startswith("CameraParameters") else variable
+        own = own if key in inside else key
         count = 1
         name = own
         while name in names:

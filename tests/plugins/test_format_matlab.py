@@ -7,13 +7,16 @@ import time
 from collections.abc import Mapping
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from format_truth import agree, directions, perspective
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from matlab_files import CELL, MATRIX, element, hdf5, matrix, object_file, of_value, structures, v5
+from opencsp_calib_formats.mat_file import read_mat
 from opencsp_calib_formats.matlab import Matlab
+from scipy.io import loadmat, savemat
 
 from opencsp_calib.errors import FileFormatError, NotExactError
 from opencsp_calib.importing import exact, fitted
@@ -88,6 +91,19 @@ def test_saved_object_under_the_name_of_its_variable(tmp_path: Path) -> None:
         same_as_formula(cameras["cameraParams"])
 
 
+def test_saved_object_in_hdf5(tmp_path: Path) -> None:
+    """Its variable is six numbers with an attribute, its data a structure among the references."""
+    path = hdf5(tmp_path / "a.mat", {"cameraParams": np.zeros((6, 1)), "#refs#": {"b": np.eye(2), "c": PARAMETERS}})
+    with h5py.File(path, "r+") as file:
+        file["cameraParams"].attrs["MATLAB_object_decode"] = np.int32(3)
+        references = file.create_dataset("#subsystem#/MCOS", (1, 2), h5py.ref_dtype)
+        references[0, 0], references[0, 1] = file["#refs#/b"].ref, file["#refs#/c"].ref
+    assert Matlab().recognises(path)
+    cameras = Matlab().read(path)
+    assert list(cameras) == ["cameraParams"]
+    same_as_formula(cameras["cameraParams"])
+
+
 def test_stereo_and_sessions(tmp_path: Path) -> None:
     other = changed(WorldUnits=1.0, IntrinsicMatrix=(K * [[2, 1, 1], [1, 2, 1], [1, 1, 1]]).T)
     pair = {"CameraParameters1": changed(WorldUnits=1.0), "CameraParameters2": other, "TranslationOfCamera2": np.eye(3)}
@@ -147,6 +163,28 @@ def test_derived_files(data_dir: Path) -> None:
         assert five.image_size == seven.image_size
     np.testing.assert_allclose(five.params, [531.6624049, 521.98904034, 434.39940472, 237.84588245, -0.0065426,
                                              0.01490159, 0, 0], rtol=1e-6)  # fmt: skip
+
+
+@pytest.mark.parametrize("compress", [True, False])
+def test_the_reader_of_v5_agrees_with_scipys(compress: bool, tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    numbers = {f"n_{t}": (rng.normal(size=(3, 4)) * 99).astype(t) for t in ("f8", "f4", "i1", "u1", "i2", "u4", "i8")}
+    cells = np.empty((1, 3), dtype=object)
+    cells[:] = [[np.eye(2), "text", np.zeros((0, 0))]]
+    inner = {"a": np.arange(3.0)[None], "word": "é", "deeper": {"x": np.array([[True]])}}
+    variables = {**numbers, "c": cells, "s": inner, "t": "héllo", "cube": rng.normal(size=(2, 3, 4))}
+    path = tmp_path / "a.mat"
+    savemat(path, variables, do_compression=compress)
+    ours, theirs = read_mat(path), loadmat(path)
+    for name in [*numbers, "cube"]:
+        assert np.array_equal(ours[name], theirs[name])
+    assert ours["t"] == theirs["t"][0]
+    assert np.array_equal(ours["c"][0], np.eye(2))
+    assert (ours["c"][1], ours["c"][2].shape) == ("text", (0, 0))
+    assert np.array_equal(ours["s"]["a"], theirs["s"]["a"][0, 0])
+    assert (ours["s"]["word"], ours["s"]["deeper"]["x"][0, 0]) == ("é", 1)
+    savemat(path, {"z": np.array([[1j]]), "x": 1.0})
+    assert read_mat(path) == {"z": None, "x": 1.0}
 
 
 def test_claims_are_not_believed(tmp_path: Path) -> None:
