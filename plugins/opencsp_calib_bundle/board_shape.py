@@ -15,8 +15,9 @@ __all__ = ["laid_on", "with_lone_corners"]
 def laid_on(given: Points, estimate: Estimate, corners: Ids) -> Estimate:
     """The same estimate in the frame and scale in which its board is nearest to the board as given.
 
-    Images tell a board's shape only up to a shift, a turn and a scale: those seven are chosen so that the corners
-    solved for have none against the given ones, in the sense of least squares (Umeyama 1991). No projection changes.
+    Images tell a board's shape only up to a shift, a turn and a scale. Those seven are chosen so that the differences
+    d of the corners solved for from the given ones p, about their middle, have none: ``sum d``, ``sum p x d`` and
+    ``sum p . d`` are zero. The turn is Procrustes' (Umeyama 1991). No projection changes.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def laid_on(given: Points, estimate: Estimate, corners: Ids) -> Estimate:
     # never a mirror image, however flat the board: its third direction is weak
     signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
     turn = left * signs @ right
-    scale = (sizes * signs).sum() / ((solved - middle) ** 2).sum()
+    scale = ((target - wanted) ** 2).sum() / (sizes * signs).sum()
     points = given.copy()
     points[corners] = scale * (solved - middle) @ turn.T + wanted
     rotations = estimate.rotations @ turn.T

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, SolveOptions
-from opencsp_calib.arrays import Ids, Mask
+from opencsp_calib.arrays import Mask
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LENS_MODELS, LensModel
 from opencsp_calib.normal_equations import residuals, solvable_corners
@@ -80,7 +80,7 @@ class BundleSolver:
 def _roughly(observations: Observations, model: str, options: SolveOptions, table: CornerTable) -> Estimate:
     """An estimate near enough to tell outliers from it, with the board as given."""
     lens = LENS_MODELS[model]
-    unknowns = _unknowns(observations, lens, replace(options, board_shape="flat"))
+    _, unknowns = _solvable(observations, lens, replace(options, board_shape="flat"), table)
 
     def from_start(chosen: SolveOptions) -> Estimate:
         return _rough_minimum(lens, table, start(observations, model, chosen), unknowns, options.robust)
@@ -100,16 +100,14 @@ def _minimum(
 ) -> tuple[Minimum, Mask]:
     """The least squares of all corners that are no outliers, and (N,) which are."""
     outliers = np.zeros(len(table), dtype=bool)
-    unknowns = _unknowns(observations, lens, options, table)
+    solvable, unknowns = _solvable(observations, lens, options, table)
     if options.board_shape != "flat":
-        estimate = _rough_minimum(lens, _solvable(table, unknowns), estimate, unknowns, options.robust)
+        estimate = _rough_minimum(lens, solvable, estimate, unknowns, options.robust)
     if options.robust:
         outliers = _outliers(lens, table, estimate, unknowns)
     for _ in range(ROUNDS):
-        kept = table.keeping(~outliers)
-        _check_counts(observations, kept)
-        unknowns = _unknowns(observations, lens, options, kept)
-        minimum = minimise(lens, _solvable(kept, unknowns), estimate, unknowns)
+        solvable, unknowns = _solvable(observations, lens, options, table.keeping(~outliers))
+        minimum = minimise(lens, solvable, estimate, unknowns)
         estimate, before = minimum.estimate, outliers
         if options.robust:
             outliers = _outliers(lens, table, estimate, unknowns)
@@ -133,17 +131,19 @@ def _rough_minimum(
     return estimate
 
 
-def _unknowns(
-    observations: Observations, lens: LensModel, options: SolveOptions, table: CornerTable | None = None
-) -> Unknowns:
-    none: Ids = np.empty(0, dtype=np.int64)
-    corners = none if table is None else solvable_corners(table, len(observations.board.points))
-    return Unknowns.of(lens, observations.board, corners, options)
-
-
-def _solvable(table: CornerTable, unknowns: Unknowns) -> CornerTable:
-    """Where corners are solved for one by one, only those."""
-    return table.keeping(np.isin(table.ids, unknowns.corners)) if len(unknowns.corners) else table
+def _solvable(
+    observations: Observations, lens: LensModel, options: SolveOptions, table: CornerTable
+) -> tuple[CornerTable, Unknowns]:
+    """What is solved for, and from which corners: where they are solved for one by one, not from those seen once."""
+    _check_counts(observations, table, "are outliers: drop it, or check the board's description")
+    corners = solvable_corners(table, len(observations.board.points))
+    unknowns = Unknowns.of(lens, observations.board, corners, options)
+    if options.board_shape == "free":
+        table = table.keeping(np.isin(table.ids, corners))
+        _check_counts(
+            observations, table, "are in no other view, so that they tell nothing of the board's shape: drop it"
+        )
+    return table, unknowns
 
 
 def _outliers(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns) -> Mask:
@@ -152,9 +152,8 @@ def _outliers(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns:
     return found & np.isin(table.ids, unknowns.corners) if len(unknowns.corners) else found
 
 
-def _check_counts(observations: Observations, table: CornerTable) -> None:
+def _check_counts(observations: Observations, table: CornerTable, what: str) -> None:
     short = np.flatnonzero(table.counts < MIN_CORNERS)
     if short.size:
         image, left = observations.used[int(short[0])].image, int(table.counts[short[0]])
-        message = f"all but {left} corners of {image} are outliers: drop it, or check the board's description"
-        raise CalibrationFailedError(message)
+        raise CalibrationFailedError(f"all but {left} corners of {image} {what}")

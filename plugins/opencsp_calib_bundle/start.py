@@ -45,7 +45,8 @@ def with_deeper_minima(observations: Observations, camera: Camera, estimate: Est
     Seen from afar, a board tilted away looks almost like one tilted towards the camera. Which of the two a linear
     solution is nearer to, noise and a start without distortion decide.
     """
-    unclear = np.flatnonzero(_depth_px(camera, estimate) < CLEAR * _view_rms(camera, estimate, table))
+    rms = _view_rms(camera, estimate, table)
+    unclear = np.flatnonzero(_depth_px(camera, estimate) < CLEAR * rms)
     rotations, translations = estimate.rotations.copy(), estimate.translations.copy()
     for view in unclear:
         try:
@@ -53,7 +54,14 @@ def with_deeper_minima(observations: Observations, camera: Camera, estimate: Est
         except CalibrationFailedError:
             continue  # what there is stays
         rotations[view], translations[view] = pose.matrix, pose.translation
-    return Estimate(estimate.params, rotations, translations, estimate.points)
+    other = Estimate(estimate.params, rotations, translations, estimate.points)
+    deeper = _view_rms(camera, other, table) < rms  # NaN, where a corner has no image, is not
+    return Estimate(
+        estimate.params,
+        np.where(deeper[:, None, None], rotations, estimate.rotations),
+        np.where(deeper[:, None], translations, estimate.translations),
+        estimate.points,
+    )
 
 
 def _posed(camera: Camera, observations: Observations) -> Estimate:

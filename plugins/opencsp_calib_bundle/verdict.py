@@ -5,6 +5,7 @@ import numpy as np
 from opencsp_calib import Calibration, CalibrationFailedError, Observations, Problem, SolveOptions
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.board_shape import TURNED_DEG, roll_spread_deg
+from opencsp_calib.convergence import LEAST_SIGMA_PX, OPEN_CENTRE, OPEN_FOCAL
 from opencsp_calib.models import LensModel
 from opencsp_calib.schur import camera_covariance
 from opencsp_calib_bundle.levenberg_marquardt import Minimum
@@ -12,10 +13,7 @@ from opencsp_calib_bundle.levenberg_marquardt import Minimum
 __all__ = ["checked_covariance", "remarks"]
 
 MANY_OUTLIERS = 0.03
-OPEN_FOCAL = 0.05  # sigma of a focal length over the focal length, above which it is as good as unknown
-OPEN_CENTRE = 0.2  # sigma of the principal point over the image's longer side, likewise
 MISFIT_PX = 5.0  # rms beyond which something else than noise is wrong
-LEAST_SIGMA_PX = 0.01  # of a corner, per axis: what can be hoped for; exact corners of a bad set are no better set
 
 
 def checked_covariance(
