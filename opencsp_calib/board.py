@@ -190,7 +190,7 @@ def parse_length(text: str) -> float:
         said = f"has the unknown unit {unit!r}" if unit else "has no unit"
         raise BoardSpecError(f"the length {text.strip()!r} {said}; write it with mm, cm, m or in, like 50mm")
     length = float(number) * UNITS_M[unit]
-    if not 0 < length < 1e4:
+    if not 1e-6 <= length < 1e4:
         raise BoardSpecError(f"{text!r} is not a usable length; write it like 50mm")
     return length
 

@@ -17,6 +17,7 @@ checksum is missing or wrong though it has a ``format_version`` is refused.
 """
 
 import hashlib
+import io
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -27,7 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.atomic import replacing
+from opencsp_calib.atomic import check_writable, replacing
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
@@ -44,6 +45,7 @@ __all__ = [
     "read_dataset",
     "save_camera",
     "write_camera",
+    "written",
 ]
 
 FORMAT_VERSION = 1
@@ -59,12 +61,26 @@ def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[st
     InputError
         If the file cannot be written; what was there before stays.
     """
-    import h5py
-
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    with written(path) as file:
         write_camera(camera, file)
         if record:
             file["Calibration/record"] = json.dumps(dict(record))
+
+
+@contextmanager
+def written(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
+    """An HDF5 file to be filled, which is put in place when the block ends well.
+
+    It is made in memory, because the HDF5 library brings the process down where a disk is full.
+    """
+    import h5py
+
+    check_writable(path)
+    content = io.BytesIO()
+    with h5py.File(content, "w") as file:
+        yield file
+    with replacing(path) as temporary:
+        temporary.write_bytes(content.getbuffer())
 
 
 def load_record(path: str | os.PathLike[str]) -> dict[str, str]:

@@ -37,13 +37,12 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.atomic import replacing
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard, RecordedBoard
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Detection, Observations, Problem, RejectedCorner, Status, View
 from opencsp_calib.errors import FileFormatError
-from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera
+from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera, written
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 
@@ -63,9 +62,7 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
     InputError
         If the file cannot be written; what was there before stays.
     """
-    import h5py
-
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    with written(path) as file:
         write_camera(calibration.camera, file)
         group = file.create_group("Calibration")
         _write_observations(calibration.observations, group.create_group("observations"))
@@ -116,9 +113,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def save_observations(observations: Observations, path: str | os.PathLike[str]) -> None:
     """Write what was detected, without a camera, aside and then in place."""
-    import h5py
-
-    with replacing(path) as temporary, h5py.File(temporary, "w") as file:
+    with written(path) as file:
         _write_observations(observations, file.create_group("Calibration/observations"))
 
 

@@ -7,6 +7,7 @@ import glob
 import hashlib
 import os
 import re
+import stat
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -117,6 +118,8 @@ def read_image(file: ImageFile) -> Image:
     """
     cv2 = _opencv()
     try:
+        if not stat.S_ISREG(file.path.stat().st_mode):
+            raise InputError(f"{file.path} is not a regular file")
         if file.path.stat().st_size > MAX_BYTES:
             raise InputError(f"{file.path} is larger than {MAX_BYTES >> 30} GiB")
         data = file.path.read_bytes()

@@ -101,6 +101,8 @@ def recognise(path: str | PathLike[str], formats: Mapping[str, CameraFormat], na
         raise InputError(f"{path} does not exist")
     if path.is_dir():
         raise InputError(f"{path} is a folder; name the camera file in it")
+    if not path.is_file():
+        raise InputError(f"{path} is not a regular file")
     readable = {key: format_ for key, format_ in formats.items() if format_.reads}
     if name is not None and name not in readable:
         raise InputError(f"no readable format is called {name!r}; there are {', '.join(sorted(readable))}")

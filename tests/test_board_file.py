@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from opencsp_calib_opencv.boards import CharucoKind, CheckerboardKind
+from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Board, CharucoBoard, Checkerboard, InputError

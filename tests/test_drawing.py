@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from defusedxml import ElementTree
-from opencsp_calib_opencv.boards import CharucoKind, CheckerboardKind
+from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 
 from opencsp_calib import Board, InputError
 from opencsp_calib.drawing import Drawing, write_board

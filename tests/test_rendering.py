@@ -6,7 +6,7 @@ from types import FunctionType
 import cv2
 import numpy as np
 import pytest
-from opencsp_calib_opencv.boards import CharucoKind
+from opencsp_calib_opencv.board_kinds import CharucoKind
 from scipy.interpolate import RectBivariateSpline
 
 from opencsp_calib import Camera, CharucoBoard, Checkerboard, Image, InputError, Pose

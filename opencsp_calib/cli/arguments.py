@@ -33,7 +33,9 @@ Output = Annotated[
     typer.Option("-o", "--output", metavar="FILE", help="The camera file to write.", rich_help_panel=OUTPUT),
 ]
 Report = Annotated[Path | None, typer.Option(metavar="FILE", help="An HTML report to write.", rich_help_panel=OUTPUT)]
-Jobs = Annotated[int | None, typer.Option(min=1, metavar="N", help="Images at a time; by default one a core.")]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, max=1024, metavar="N", help="Images at a time; by default one per core.")
+]
 DetectorName = Annotated[str | None, typer.Option("--detector", metavar="NAME", help="Which detector looks for it.")]
 RefineBy = Annotated[
     Literal["none", "subpix", "model"] | None,

@@ -13,6 +13,7 @@ from opencsp_calib.errors import InputError
 if TYPE_CHECKING:
     from opencsp_calib.calibration import Calibration
     from opencsp_calib.detection import Observations
+    from opencsp_calib.images import ImageFile
 
 PRESET_OPENCSP = {
     "detector": "opencsp",
@@ -49,7 +50,8 @@ def calibrate(
         float | None, typer.Option(min=0, metavar="PX", help="Leave out views above this rms, solve again.")
     ] = None,
     pixel_pitch: Annotated[
-        float | None, typer.Option(min=0.01, metavar="UM", help="Size of a pixel, to show focal length in mm.")
+        float | None,
+        typer.Option(min=0.01, max=1000, metavar="UM", help="Pixel size, to show focal length in mm."),
     ] = None,
     note: Annotated[
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="To keep with the camera: focus, aperture ...")
@@ -79,6 +81,7 @@ def calibrate(
     started = time.perf_counter()
     target = pipeline.board_from(board)
     files = find_images(images)
+    _check_not_input(files, output, report)
     record = _record(note or [], pixel_pitch)
     with detection_progress() as progress:
         observations = pipeline.detect(images, target, jobs=jobs, progress=progress, **finding)
@@ -218,6 +221,14 @@ def _check_targets(*paths: Path | None) -> None:
     for path in paths:
         if path is not None:
             check_writable(path)
+
+
+def _check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:
+    """No result may take the place of a photograph."""
+    photographs = {file.path.resolve() for file in files}
+    for target in targets:
+        if target is not None and target.resolve() in photographs:
+            raise InputError(f"{target} is one of the photographs; give another name for the result")
 
 
 def _finish(

@@ -71,6 +71,8 @@ def compare(
 
     if plot:
         check_writable(plot)
+        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
+            raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {plot.name}")
     difference = compared(camera_in(a), camera_in(b), range_m=range_m)
     where = "at infinity" if range_m is None else f"at {range_m:g} m"
     say(

@@ -14,7 +14,7 @@ __all__ = ["boards", "detectors", "solvers"]
 @hookimpl
 def boards() -> Iterator[BoardKind]:
     """Plain checkerboards and ChArUco boards."""
-    from opencsp_calib_opencv.boards import CharucoKind, CheckerboardKind
+    from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 
     yield CheckerboardKind()
     yield CharucoKind()

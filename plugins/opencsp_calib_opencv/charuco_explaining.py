@@ -6,7 +6,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import CharucoBoard
-from opencsp_calib_opencv.boards import DICTIONARIES
+from opencsp_calib_opencv.board_kinds import DICTIONARIES
 from opencsp_calib_opencv.layout import laid_out, read_board
 from opencsp_calib_opencv.levels import Level
 from opencsp_calib_opencv.markers import Markers, cells_of, dictionary_size, found_quads, read_markers

@@ -6,7 +6,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import CharucoBoard
-from opencsp_calib_opencv.boards import opencv_board
+from opencsp_calib_opencv.board_kinds import opencv_board
 from opencsp_calib_opencv.markers import Cells, Markers, quad_areas, read_markers
 
 __all__ = ["Layout", "laid_out", "read_board"]

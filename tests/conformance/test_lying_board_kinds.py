@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 from lies import caught
-from opencsp_calib_opencv.boards import CheckerboardKind
+from opencsp_calib_opencv.board_kinds import CheckerboardKind
 
 from opencsp_calib.board import Checkerboard
 from opencsp_calib.errors import BoardSpecError

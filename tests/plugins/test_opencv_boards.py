@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from opencsp_calib_opencv.boards import DICTIONARIES, CharucoKind, CheckerboardKind
+from opencsp_calib_opencv.board_kinds import DICTIONARIES, CharucoKind, CheckerboardKind
 
 from opencsp_calib import CharucoBoard, Checkerboard
 from opencsp_calib.errors import BoardSpecError
@@ -158,7 +158,7 @@ import sys, importlib.util
 found = importlib.util.find_spec
 importlib.util.find_spec = lambda name, *rest: None if name == "cv2" else found(name, *rest)
 sys.modules["cv2"] = None
-from opencsp_calib_opencv.boards import CharucoKind, CheckerboardKind
+from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 from opencsp_calib.errors import MissingDependencyError
 print(CheckerboardKind().parse("checkerboard:18x23:50mm").spec, CheckerboardKind().missing())
 board = CharucoKind().parse("charuco:5x7:30mm:22mm:DICT_4X4_50")
