@@ -21,7 +21,7 @@ PROFILE_SAMPLES = 31
 ALONG = (0.35, 0.5, 0.65)  # where an edge is crossed, as part of its length: far from the corners at its ends
 CLEAR = 0.4  # of a square's height: half a profile reaches no nearer to the next edge
 LARGEST_HALF_PX = 14.0
-SIGMAS = 4.0  # half a profile, in edge widths: 3 leave a thousandth of the step outside
+SIGMAS, FEWEST_SIGMAS = 5.0, 2.5  # half a profile, in edge widths: with less, its ends are not yet flat
 FEWEST_EDGES, MOST_EDGES = 8, 150  # each way; more tell nothing new
 INTERPOLATION_PX2 = 1 / 6  # what sampling between pixels adds to the variance: that of the triangle that bilinear is
 
@@ -97,7 +97,7 @@ def _edges(image: Image, grid: Floats, axis: int) -> tuple[Floats, Floats]:
             return normals[:0], variances[:0]
         usual = np.sqrt(max(float(np.median(variances[good])), 0.25))
         half = np.minimum(clearance, SIGMAS * usual)
-    good &= clearance > 0.6 * SIGMAS * usual
+    good &= clearance > FEWEST_SIGMAS * usual
     return normals[good], variances[good]
 
 
