@@ -106,7 +106,7 @@ def decide(observations: Observations, options: SolveOptions, run: Run, *, aspec
     try:
         solved = _shape_solved(observations, replace(shape, guess=given.camera), run)
         evidence = _evidence(given, solved)
-    except (CalibError, np.linalg.LinAlgError) as error:
+    except CalibError as error:
         message = f"the board was taken as it is given, because its shape could not be solved for: {error}"
         return given.with_problems(Problem("board-as-given", message))
     if evidence.for_shape:

@@ -14,7 +14,7 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations
-from opencsp_calib.errors import InputError
+from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.pose_fit import pose_residuals
 from opencsp_calib.schur import factorise
@@ -129,10 +129,13 @@ def nearby_halves(calibration: Calibration, *, range_m: float | None = None) -> 
     ------
     InputError
         If there are fewer than four used views.
-    numpy.linalg.LinAlgError
+    CalibrationFailedError
         If a half does not determine the camera.
     """
-    first, second = (_stepped(_part(calibration, half)) for half in halves(calibration.observations))
+    try:
+        first, second = (_stepped(_part(calibration, half)) for half in halves(calibration.observations))
+    except np.linalg.LinAlgError as error:
+        raise CalibrationFailedError(f"half of the views do not determine the camera ({error})") from None
     return compare(first, second, range_m=range_m)
 
 

@@ -24,6 +24,7 @@ from scipy.special import stdtrit
 from opencsp_calib.arrays import Floats, Matrix, Params
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Problem
+from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
 from opencsp_calib.schur import camera_covariance, camera_without_each_view
@@ -40,6 +41,7 @@ __all__ = [
 ]
 
 UNKNOWN = {"undetermined", "uncertainty-unknown"}
+ROUNDING = 1e-9  # px (or sigmas, where corners are weighted): what is left of exact corners tells nothing
 MIN_VIEWS = 3  # with two views, leaving one out leaves nothing to compare
 
 
@@ -85,7 +87,7 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
         equations = normal_equations(calibration)
         if equations.dof <= 0:
             raise np.linalg.LinAlgError("no more observations than unknowns")
-        residual = camera_covariance(equations) * equations.cost / equations.dof
+        residual = camera_covariance(equations) * max(equations.cost / equations.dof, ROUNDING**2)
         steps = camera_without_each_view(equations)
     except np.linalg.LinAlgError as error:
         message = f"the views do not determine the camera ({error}): take more of them, from different directions"
@@ -108,10 +110,15 @@ def influence(calibration: Calibration) -> tuple[Influence, ...]:
 
     Raises
     ------
-    numpy.linalg.LinAlgError
-        If all views together do not determine it: `with_uncertainty` has said so.
+    CalibrationFailedError
+        If all views together do not determine it.
     """
-    steps = camera_without_each_view(normal_equations(calibration))
+    try:
+        steps = camera_without_each_view(normal_equations(calibration))
+    except np.linalg.LinAlgError as error:
+        raise CalibrationFailedError(
+            f"no influence of views: together they do not determine the camera ({error})"
+        ) from None
     return _influence(calibration, steps, Alignment.at_infinity(calibration.camera).grid_jacobian)
 
 

@@ -199,3 +199,30 @@ def test_sandias_photographs(data_dir: Path) -> None:
     assert most.image == "010.png"
     assert most.params[2] == pytest.approx(6.7, rel=0.15)
     assert any(p.code == "hangs-on-view" and "010.png" in p.message for p in result.problems)
+
+
+@pytest.mark.parametrize("way", ["flat", "free"])
+def test_exact_corners_hang_on_nothing_and_break_nothing(way: str) -> None:
+    seen = observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, 8, 1))
+    result = with_uncertainty(solved(seen, WAYS[way]))
+    views = zip(seen.used, result.cam_from_board, strict=True)
+    exact = tuple(
+        replace(v, detection=replace(v.detection, pixels=result.camera.project(p.transform(result.board.points))))
+        for v, p in views
+    )
+    to_the_bit = replace(result, observations=replace(seen, views=exact), residuals=None, covariance=None)
+    for one in (result, with_uncertainty(to_the_bit)):
+        assert (one.sigma > 0).all()
+        assert (one.sigma[:4] < 1e-6).all()
+        assert not any(p.code == "hangs-on-view" for p in one.problems)
+
+
+def test_views_that_do_not_determine_the_camera_are_said_to() -> None:
+    """All head-on: the focal length is open. The solver refuses; here its last guess comes from elsewhere."""
+    level = random_poses(BOARD, CAMERA, 6, 1, tilt_deg=(0.0, 1e-6), fill=(0.9, 0.9))
+    seen = observe(CAMERA, BOARD, level, noise_px=0.0)
+    bare = replace(CAMERA, params=[*CAMERA.params[:4], 0, 0, 0, 0])
+    guess = Calibration(bare, seen, level, BOARD, "by hand", WAYS["flat"])
+    result = with_uncertainty(guess)
+    unknown = np.isnan(result.sigma).all() or result.sigma[0] > 1e3
+    assert unknown
