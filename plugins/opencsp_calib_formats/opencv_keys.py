@@ -43,6 +43,7 @@ DISTORTION_KEY = re.compile(SIDE.format("|".join(DISTORTION)))
 WIDTH_HEIGHT = (
     ("imagewidth", "imageheight"),
     ("imagesizewidth", "imagesizeheight"),
+    ("imagewidthpx", "imageheightpx"),
     ("imgwidth", "imgheight"),
     ("framewidth", "frameheight"),
     ("camerawidth", "cameraheight"),
@@ -140,6 +141,7 @@ def image_size_of(fields: Fields, side: str, centre: Floats) -> tuple[tuple[int,
         The principal point, which tells whether a pair is width and height or numpy's height and width.
     """
     values = {plain(key): value for key, value in fields.values.items()}
+    keys = {plain(key): str(key) for key in fields.values}
     for width, height in WIDTH_HEIGHT:
         for end in (side, ""):
             if width + end in values and height + end in values:
@@ -150,7 +152,7 @@ def image_size_of(fields: Fields, side: str, centre: Floats) -> tuple[tuple[int,
     for name in SIZE + SHAPE:
         for end in (side, ""):
             if _is_pair(values.get(name + end)):
-                return _pair(values[name + end], fields.path(name), centre, height_first=name in SHAPE)
+                return _pair(values[name + end], fields.path(keys[name + end]), centre, height_first=name in SHAPE)
     return None, ()
 
 
