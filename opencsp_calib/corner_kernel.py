@@ -30,6 +30,9 @@ __all__ = ["CONVERGED", "DIAGNOSTICS", "FAILED", "OUTSIDE", "PARAMETERS", "RAMP_
 
 PARAMETERS = 11  # x, y, angle of edge 1, of edge 2, s, a, b, gradient of a in x and y, gradient of b
 DIAGNOSTICS = 23
+USUAL_GRADIENT_OF_A, USUAL_GRADIENT_OF_B = 0.02, 0.002  # of b, per px: a lamp's reflection is steep, light is not
+CALM_TURNS = 6  # after which steps that overshoot, back and forth, are halved
+SHARPEST_PX = 0.3  # that a pixel can see, being 0.29 wide itself; what was sharpened afterwards seems sharper
 RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of the window
 
 # Columns of the buffer: derivatives by each parameter, residual, x, y, grey level. The derivative by a is the root
@@ -119,7 +122,9 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
     s = p[4]
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
     cosine, stretch = x1 * x2 + y1 * y2, 1.0 / abs(x1 * y2 - y1 * x2)
-    box = -1.0 / (1440.0 * s**4)  # the fourth cumulant of a box of width w is -w^4/120; over 12, see _profile
+    box = -1.0 / (
+        1440.0 * max(s, 0.4) ** 4
+    )  # the fourth cumulant of a box of width w is -w^4/120; over 12, see _profile
     kurtosis1, kurtosis2 = box * (x1**4 + y1**4), box * (x2**4 + y2**4)
     limit1, limit2, clear1, clear2 = window[0] / RAMP_PX + 0.5, window[1] / RAMP_PX + 0.5, window[2], window[3]
     total = 0.0
@@ -167,6 +172,19 @@ def _accumulate(work: Floats, n: int, normal: Floats) -> None:
             for k in range(n):
                 total += work[i * STRIDE + k] * work[j * STRIDE + k]
             normal[i, j] = total
+
+
+@_exact
+def _expect(p: Floats, variance: float, normal: Floats) -> None:
+    """Add what is known of gradients before looking: their usual size, relative to the amplitude.
+
+    In small windows and much blur they can hardly be told from a shift of the corner.
+    """
+    for k in range(7, PARAMETERS):
+        usual = (USUAL_GRADIENT_OF_A if k < 9 else USUAL_GRADIENT_OF_B) * p[6]
+        weight = variance / (usual * usual + 1e-9)
+        normal[k, k] += weight
+        normal[PARAMETERS, k] -= weight * p[k]
 
 
 @_exact
@@ -223,7 +241,7 @@ def _fit(
 ) -> tuple[int, int]:
     """Gauss-Newton's method, a step halved until the misfit falls; status and number of pixels."""
     n, best = 0, math.inf
-    for _ in range(most_steps):
+    for turn in range(most_steps):
         n = _gather(image, p, window, work)
         if n < 3 * PARAMETERS:
             return OUTSIDE, n
@@ -236,16 +254,23 @@ def _fit(
                 p[k] -= step[k]
             continue
         best = min(best, misfit)
+        _expect(p, misfit, normal)
+        if p[4] <= SHARPEST_PX and normal[PARAMETERS, 4] < 0.0:
+            normal[4, 4] *= 1e6  # as sharp as can be: the others' step must not count on more
         if not _factorise(normal, factor):
             return FAILED, n
         for k in range(len(step)):
             step[k] = normal[PARAMETERS, k]
         _solve(factor, step)
+        close = math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance
         fraction = _trusted_part(p, step)
+        if turn >= CALM_TURNS:
+            fraction *= 0.5
         for k in range(len(step)):
             step[k] *= fraction
             p[k] += step[k]
-        if math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance:
+        p[4] = max(p[4], SHARPEST_PX)
+        if close:
             return CONVERGED, n
     return FAILED, n
 

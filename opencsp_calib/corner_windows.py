@@ -10,7 +10,7 @@ from opencsp_calib.corner_fit import CornerFit, Levels
 
 __all__ = ["FULL", "NEAR", "SMALL", "Surroundings", "WindowSize"]
 
-MOST_STEPS = 15
+MOST_STEPS = 20
 SMALLEST_HALF_WINDOW_PX = 2.5
 
 
