@@ -152,7 +152,10 @@ def _step(camera: Camera, turned: Points, at: Vector, error: Pixels, damping: fl
     jacobian = frame_jacobian(by_point, turned, shifted=True).reshape(-1, 6)
     normal, slope = jacobian.T @ jacobian, jacobian.T @ error.ravel()
     normal[np.diag_indices(6)] *= 1.0 + damping
-    step = -np.linalg.solve(normal, slope)
+    try:
+        step = -np.linalg.solve(normal, slope)
+    except np.linalg.LinAlgError:  # corners on one line of sight: nothing to be gained from here
+        return np.zeros(6), 0.0
     return step, float(-slope @ step)
 
 
