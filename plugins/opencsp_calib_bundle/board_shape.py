@@ -60,5 +60,6 @@ def with_lone_corners(lens: LensModel, table: CornerTable, estimate: Estimate) -
     rays = (lens.unproject(table.pixels[lone], estimate.params)[:, None, :] @ rotations)[:, 0]
     cameras = -(estimate.translations[view][:, None, :] @ rotations)[:, 0]
     points = estimate.points.copy()
-    points[ids] = cameras + rays * ((points[ids] - cameras) * rays).sum(axis=1, keepdims=True)
+    seen = cameras + rays * ((points[ids] - cameras) * rays).sum(axis=1, keepdims=True)
+    points[ids] = np.where(np.isfinite(seen), seen, points[ids])  # not where the camera has no ray for the pixel
     return replace(estimate, points=points)

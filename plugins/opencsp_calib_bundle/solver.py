@@ -104,13 +104,13 @@ def _minimum(
     if options.board_shape != "flat":
         estimate = _rough_minimum(lens, solvable, estimate, unknowns, options.robust)
     if options.robust:
-        outliers = _outliers(lens, table, estimate, unknowns)
+        outliers = _outliers(lens, table, estimate, unknowns, outliers)
     for _ in range(ROUNDS):
         solvable, unknowns = _solvable(observations, lens, options, table.keeping(~outliers))
         minimum = minimise(lens, solvable, estimate, unknowns)
         estimate, before = minimum.estimate, outliers
         if options.robust:
-            outliers = _outliers(lens, table, estimate, unknowns)
+            outliers = _outliers(lens, table, estimate, unknowns, before)
         if np.array_equal(outliers, before):
             break
     return minimum, before
@@ -146,10 +146,10 @@ def _solvable(
     return table, unknowns
 
 
-def _outliers(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns) -> Mask:
-    """(N,); a corner that is solved for from one view alone agrees with it, whatever is wrong."""
+def _outliers(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, before: Mask) -> Mask:
+    """(N,); a corner that is left with one view agrees with it, whatever is wrong: of it, the last judgement stays."""
     found = outlying(table, residuals(lens, table, estimate))
-    return found & np.isin(table.ids, unknowns.corners) if len(unknowns.corners) else found
+    return np.where(np.isin(table.ids, unknowns.corners), found, before) if len(unknowns.corners) else found
 
 
 def _check_counts(observations: Observations, table: CornerTable, what: str) -> None:
