@@ -129,7 +129,7 @@ def test_blocks_are_the_products_of_a_numerical_jacobian(shape, aspect, weights)
     assert dense.equations.numbers == len(r)
 
 
-# of those with more coefficients, combinations are solved for that move no pixel of so narrow a lens: no slope to measure
+# of those with more coefficients, combinations are solved for that move no pixel of so narrow a lens
 @pytest.mark.parametrize("model", ["pinhole", "opencv4", "opencv5", "opencv_fisheye"])
 def test_blocks_of_lens_models(model):
     lens = LENS_MODELS[model]
