@@ -122,8 +122,9 @@ def write_camera(camera: Camera, file: "h5py.File") -> None:
     group["image_shape_xy"] = np.array(camera.image_size, dtype=np.int32)
     group["name"] = camera.name
     group.attrs["format_version"] = FORMAT_VERSION
-    group.attrs["model"] = camera.model
-    group.attrs["checksum"] = _checksum(group)
+    # of fixed length: the HDF5 library may hang or crash over a damaged attribute of variable length
+    group.attrs["model"] = np.bytes_(camera.model)
+    group.attrs["checksum"] = np.bytes_(_checksum(group))
 
 
 @contextmanager
@@ -191,15 +192,25 @@ def _camera(file: "h5py.File", path: str) -> tuple[Camera, tuple[Problem, ...]]:
 
 
 def _verify(group: "h5py.Group", path: str) -> None:
-    version = int(group.attrs["format_version"])
+    version = int(_attribute(group, "format_version"))
     if version > FORMAT_VERSION:
         raise FileFormatError(f"{path} was written by a newer opencsp-calib (format {version}); update this one")
-    if group.attrs.get("checksum") != _checksum(group):
+    if _attribute(group, "checksum") != _checksum(group):
         raise FileFormatError(f"{path} is damaged: the checksum of /Camera does not fit its contents")
 
 
+def _attribute(group: "h5py.Group", name: str) -> str:
+    """A whole number or a text of fixed length, as text; empty if there is none."""
+    if name not in group.attrs:
+        return ""
+    if group.attrs.get_id(name).dtype.kind not in "iuS":
+        raise FileFormatError(f"{group.file.filename}: the attribute {name} of {group.name} is of an unexpected type")
+    value = group.attrs[name]
+    return value.decode() if isinstance(value, bytes) else str(value)
+
+
 def _checksum(group: "h5py.Group") -> str:
-    digest = hashlib.sha256(f"{group.attrs['format_version']} {group.attrs['model']}".encode())
+    digest = hashlib.sha256(f"{_attribute(group, 'format_version')} {_attribute(group, 'model')}".encode())
     for name in sorted(group):
         value = read_dataset(group, name)
         if isinstance(value, str):
@@ -212,7 +223,7 @@ def _checksum(group: "h5py.Group") -> str:
 
 
 def _distortion(group: "h5py.Group", path: str) -> tuple[str, Floats]:
-    model = str(group.attrs.get("model", ""))
+    model = _attribute(group, "model")
     if model == "opencv_fisheye":
         return model, _numbers(group, "fisheye_coef", (4,))
     coefficients = np.atleast_1d(_numbers(group, "distortion_coef", None))
