@@ -15,7 +15,6 @@ import numpy as np
 from opencsp_calib.arrays import Mask
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.comparison import Difference, compare
-from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.options import SolveOptions
@@ -152,20 +151,19 @@ def validate(calibration: Calibration, solvers: Mapping[str, Solver], *, models:
     models : sequence of str
         Lens models to try, from the simplest to the richest.
     """
-    calibration = _without_outliers(calibration)
+    calibration = _keeping(calibration, [~outliers for outliers in calibration.outliers])
     results, left_out = _all_solved(calibration, solvers)
     pairs = tuple(
         Pair(a.name, b.name, compare(a.calibration.camera, b.calibration.camera)) for a, b in combinations(results, 2)
     )
-    engine = _engine(calibration, solvers)
-    trials = Trials.of(calibration, engine, models) if engine else Trials(left_out=("no solver here can repeat it",))
-    reasons = (*_of_solvers(pairs), *left_out, *_of_halves(trials), *_of_models(trials), *_of_board(trials))
+    trials, with_what = _tried(calibration, solvers, models)
+    reasons = (*_of_solvers(pairs), *left_out, *with_what, *_of_halves(trials), *_of_models(trials), *_of_board(trials))
     return Validation(calibration, results, pairs, trials, (*reasons, *trials.left_out))
 
 
 def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tuple[tuple[SolverResult, ...], list[str]]:
     """By every solver that can, the board as solved held fixed; and why the others could not."""
-    observations = _of_known_corners(calibration)
+    observations = _of_known_corners(calibration).observations
     results, left_out = [], []
     for name, solver in sorted(solvers.items()):
         begin = time.perf_counter()
@@ -180,47 +178,49 @@ def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tupl
     return tuple(results), left_out
 
 
-def _engine(calibration: Calibration, solvers: Mapping[str, Solver]) -> Solver | None:
-    """The solver that made the calibration; where it is not here, the first that can do the same."""
-    own = calibration.solver.split(" ")[0]
-    for _, solver in sorted(solvers.items(), key=lambda item: (item[0] != own, item[0])):
-        able = calibration.camera.model in solver.models and calibration.options.asked <= solver.abilities
-        if able and solver.missing() is None:
-            return solver
-    return None
+def _tried(
+    calibration: Calibration, solvers: Mapping[str, Solver], models: Sequence[str]
+) -> tuple[Trials, tuple[str, ...]]:
+    """With the solver that made the calibration, or the first that can do the same; else more simply, which is said."""
+    own, model = calibration.solver.split(" ")[0], calibration.camera.model
+    order = sorted(solvers.items(), key=lambda item: (item[0] != own, item[0]))
+    here = [solver for _, solver in order if model in solver.models and solver.missing() is None]
+    for solver in here:
+        if calibration.options.asked <= solver.abilities:
+            return Trials.of(calibration, solver, models), ()
+    if not here:
+        return Trials(), (f"halves and lens models were not tried: no solver here has {model}",)
+    held = replace(_of_known_corners(calibration), options=LIKE_WITH_LIKE)
+    said = f"halves and lens models: no solver here can do all that {own} did; {here[0].name} with the board as solved"
+    return Trials.of(held, here[0], models), (f"{said}, equal weights",)
 
 
-def _without_outliers(calibration: Calibration) -> Calibration:
-    """The same, as if the corners that it left out had never been seen."""
-    kept = [~mask for mask in calibration.outliers]
-    return replace(
-        calibration,
-        observations=_keeping(calibration.observations, kept),
-        residuals=tuple(residuals[mask] for residuals, mask in zip(calibration.residuals, kept, strict=True)),
-        outliers=tuple(np.zeros(int(mask.sum()), dtype=np.bool_) for mask in kept),
-    )
-
-
-def _of_known_corners(calibration: Calibration) -> Observations:
-    """Of the board as solved, without corners that were not solved for."""
+def _of_known_corners(calibration: Calibration) -> Calibration:
+    """On the board as solved, taken as given; without corners that were not solved for."""
     known = known_corners(calibration)
-    observations = calibration.observations.with_board(calibration.board)
-    return _keeping(observations, [known[detection.ids] for detection in observations.detections])
+    kept = _keeping(calibration, [known[detection.ids] for detection in calibration.observations.detections])
+    return replace(kept, observations=kept.observations.with_board(calibration.board))
 
 
-def _keeping(observations: Observations, masks: Sequence[Mask]) -> Observations:
-    """Only some corners of each used view."""
-    kept = dict(zip((view.image for view in observations.used), masks, strict=True))
+def _keeping(calibration: Calibration, masks: Sequence[Mask]) -> Calibration:
+    """The same, as if of each used view only some corners had been seen."""
+    observations = calibration.observations
+    chosen = dict(zip((view.image for view in observations.used), masks, strict=True))
     views = tuple(
-        replace(view, detection=view.detection.keeping(kept[view.image])) if view.image in kept else view
+        replace(view, detection=view.detection.keeping(chosen[view.image])) if view.image in chosen else view
         for view in observations.views
     )
-    return replace(observations, views=views)
+    return replace(
+        calibration,
+        observations=replace(observations, views=views),
+        residuals=tuple(r[mask] for r, mask in zip(calibration.residuals, masks, strict=True)),
+        outliers=tuple(o[mask] for o, mask in zip(calibration.outliers, masks, strict=True)),
+    )
 
 
 def _of_solvers(pairs: Sequence[Pair]) -> tuple[str, ...]:
     if not pairs:
-        return ("fewer than two solvers could run: there was nothing to compare; install another",)
+        return ("fewer than two solvers could run: there was nothing to compare; install or name another",)
     apart = [pair for pair in pairs if not pair.agree]
     if not apart:
         worst = max(pair.difference.worst_px for pair in pairs)

@@ -163,6 +163,14 @@ def test_one_solver_has_nobody_to_agree_with_and_it_is_said() -> None:
     assert [trial.model for trial in found.trials.models] == ["opencv4"]  # the own model is always tried
 
 
+def test_a_solver_that_can_do_less_does_what_it_can_and_it_is_said() -> None:
+    calibration = solved(world(bow_m=0.0015), board_shape="free", weights="covariance")
+    found = validate(calibration, {"opencv": OpenCVSolver()}, models=())
+    assert "no solver here can do all that bundle did; opencv with the board as solved" in " ".join(found.reasons)
+    assert found.trials.own is not None
+    assert found.trials.own.held_out.rms_px < 1.2 * 0.05 * np.sqrt(2)  # it does hold the board as solved
+
+
 def test_without_any_solver_there_is_still_an_answer() -> None:
     found = validate(solved(world()), {"missing": Missing()}, models=())
     assert found.trials.own is None
