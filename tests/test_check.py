@@ -47,7 +47,7 @@ def test_the_true_camera_is_ok() -> None:
 
 def test_a_turn_of_the_frame_is_no_change() -> None:
     """The true camera but for its principal point, moved by a third of a pixel: a turn, to second order."""
-    verdicts = [check(changed(cx=0.3), photographed(noise_px=0.2, seed=seed), solve).verdict for seed in range(3)]
+    verdicts = [check(changed(cx=0.3), photographed(noise_px=0.1, seed=seed), solve).verdict for seed in range(3)]
     assert verdicts.count("ok") >= 2  # by chance, a few in a hundred are not
 
 
