@@ -147,10 +147,11 @@ def begin(image: Levels, pixels: Pixels, vectors: Floats) -> CornerFit:
 
     height, width = image.shape
     far = np.array([-0.4, -0.3, -0.2, 0.2, 0.3, 0.4])
+    vectors = np.nan_to_num(vectors)
     along_row, along_column = far[:, None] * vectors[:, None, 0], far[:, None] * vectors[:, None, 1]
     places = pixels[:, None, None] + along_row[:, :, None] + along_column[:, None, :]
-    x, y = np.rint(places).astype(np.int64).transpose(3, 0, 1, 2)
-    levels = image[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)].astype(np.float64)
+    x, y = np.rint(np.clip(places, 0, (width - 1, height - 1))).astype(np.int64).transpose(3, 0, 1, 2)
+    levels = image[y, x].astype(np.float64)
     same_side = np.sign(far)[:, None] * np.sign(far)
     parameters = np.zeros((len(pixels), PARAMETERS))
     parameters[:, :2] = pixels

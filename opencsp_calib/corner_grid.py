@@ -78,7 +78,8 @@ def bends(pixels: Pixels, ids: Ids, columns: int) -> tuple[Floats, Floats]:
         along = (after - before) / 2
         normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
         length = np.linalg.norm(along, axis=1)
-        measured = ((before + after - 2 * pixels) * normal).sum(axis=1) / length**3
+        with np.errstate(divide="ignore", invalid="ignore"):  # two corners in one place
+            measured = ((before + after - 2 * pixels) * normal).sum(axis=1) / length**3
         values[:, axis], deviations[:, axis] = _smoothed(measured, row, column)
     return values, deviations
 
@@ -92,9 +93,12 @@ def displaced(pixels: Pixels, ids: Ids, columns: int) -> Mask:
     off = np.zeros(len(ids), dtype=bool)
     for axis, (before, after) in enumerate(_neighbours(_placed(pixels, ids, columns), ids, columns)):
         along = after - before
-        normal = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
-        offset = ((pixels - (before + after) / 2) * normal).sum(axis=1)
-        size = np.abs(offset - np.nan_to_num(_beside(offset, ids, columns, axis).mean(axis=0)))
+        normal = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):  # two corners in one place
+            offset = ((pixels - (before + after) / 2) * normal).sum(axis=1) / np.linalg.norm(along, axis=1)
+        others = _beside(offset, ids, columns, axis)
+        count = np.maximum(np.isfinite(others).sum(axis=0), 1)
+        size = np.abs(offset - np.nan_to_num(others).sum(axis=0) / count) / np.sqrt(1 + 1 / count)
         known = np.isfinite(size)
         if known.any():
             usual = 1.4826 * float(np.median(size[known]))

@@ -13,7 +13,7 @@ the corner in every step, and ends in a soft ramp instead of at whole pixels.
 The form of the code is ruled by the compiler. One flat buffer with constant offsets, because LLVM vectorises a loop
 only where it can prove that what is written is not read again, and gives up beyond a hundred pairs of columns. No
 slices, because each costs a tenth of a second of compilation. Lengths are asked for, though constant, lest loops be
-unrolled.
+unrolled. All in one file, because Numba's cache looks for changes in the file of the outermost function only.
 """
 
 import math
@@ -121,7 +121,7 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
     """Fill the columns: residual and derivatives, each times the root of the pixel's weight; the sum of weights."""
     s = p[4]
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
-    cosine, stretch = x1 * x2 + y1 * y2, 1.0 / abs(x1 * y2 - y1 * x2)
+    cosine, sine = x1 * x2 + y1 * y2, x1 * y2 - y1 * x2
     box = -1.0 / (
         1440.0 * max(s, 0.4) ** 4
     )  # the fourth cumulant of a box of width w is -w^4/120; over 12, see _profile
@@ -131,7 +131,7 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
     for k in range(n):
         x, y = work[X + k], work[Y + k]
         across1, across2 = y * x1 - x * y1, y * x2 - x * y2
-        along1, along2 = abs(across2) * stretch, abs(across1) * stretch
+        along1, along2 = abs(across2 / sine), abs(across1 / sine)
         weight = min(max(limit1 - along1 / RAMP_PX, 0.0), 1.0) * min(max(limit2 - along2 / RAMP_PX, 0.0), 1.0)
         weight *= min(max(max(clear1 - along1, clear2 - along2), 0.0), 1.0)
         total += weight
@@ -141,14 +141,16 @@ def _differentiate(p: Floats, bend1: float, bend2: float, window: Floats, n: int
         z2 = (across2 - 0.5 * bend2 * turn2 * turn2) / s
         u, du = _profile(z1, kurtosis1)
         v, dv = _profile(z2, kurtosis2)
-        pattern = u * v + cosine * du * dv * (1.0 + 0.5 * cosine * z1 * z2)
-        steepness = root * (p[6] + p[9] * x + p[10] * y) / s
-        slope1 = steepness * du * v
-        slope2 = steepness * u * dv
+        skew, more = cosine * du * dv, 1.0 + 0.5 * cosine * z1 * z2
+        pattern = u * v + skew * more
+        height = root * (p[6] + p[9] * x + p[10] * y)
+        slope1 = height / s * (du * v + skew * (0.5 * cosine * z2 - z1 * more))
+        slope2 = height / s * (u * dv + skew * (0.5 * cosine * z1 - z2 * more))
+        shear = height * sine * du * dv * (1.0 + cosine * z1 * z2)
         work[k] = slope1 * y1 + slope2 * y2
         work[STRIDE + k] = -slope1 * x1 - slope2 * x2
-        work[2 * STRIDE + k] = -slope1 * turn1
-        work[3 * STRIDE + k] = -slope2 * turn2
+        work[2 * STRIDE + k] = shear - slope1 * turn1
+        work[3 * STRIDE + k] = -shear - slope2 * turn2
         work[4 * STRIDE + k] = -(slope1 * z1 + slope2 * z2)
         work[5 * STRIDE + k] = root
         work[6 * STRIDE + k] = root * pattern
@@ -176,15 +178,17 @@ def _accumulate(work: Floats, n: int, normal: Floats) -> None:
 
 @_exact
 def _expect(p: Floats, variance: float, normal: Floats) -> None:
-    """Add what is known of gradients before looking: their usual size, relative to the amplitude.
+    """Add what is known before looking: that gradients are small, relative to the amplitude, and what can be sharp.
 
-    In small windows and much blur they can hardly be told from a shift of the corner.
+    In small windows and much blur gradients can hardly be told from a shift of the corner.
     """
     for k in range(7, PARAMETERS):
         usual = (USUAL_GRADIENT_OF_A if k < 9 else USUAL_GRADIENT_OF_B) * p[6]
         weight = variance / (usual * usual + 1e-9)
         normal[k, k] += weight
         normal[PARAMETERS, k] -= weight * p[k]
+    if p[4] <= SHARPEST_PX and normal[PARAMETERS, 4] < 0.0:
+        normal[4, 4] *= 1e6  # it will not get sharper, and the others' step must not count on it
 
 
 @_exact
@@ -255,8 +259,6 @@ def _fit(
             continue
         best = min(best, misfit)
         _expect(p, misfit, normal)
-        if p[4] <= SHARPEST_PX and normal[PARAMETERS, 4] < 0.0:
-            normal[4, 4] *= 1e6  # as sharp as can be: the others' step must not count on more
         if not _factorise(normal, factor):
             return FAILED, n
         for k in range(len(step)):

@@ -70,7 +70,7 @@ class Surroundings:
         from opencsp_calib.corner_kernel import DIAGNOSTICS, FAILED, WORK_SIZE
 
         windows = self.windows(start, size)
-        chosen = np.flatnonzero(where & np.isfinite(windows).any(axis=1))
+        chosen = np.flatnonzero(where & np.isfinite(windows[:, 0]))
         parameters = start.parameters[chosen]
         found = np.zeros((len(chosen), DIAGNOSTICS))
         room = np.empty(WORK_SIZE)
@@ -92,8 +92,9 @@ class Surroundings:
         halves = np.minimum(size.fraction * self.lengths, size.largest_px)
         reach = ((halves + RAMP_PX)[:, :, None] * np.abs(fit.directions)).sum(axis=1)
         room = np.minimum(fit.pixels, np.array([width - 1, height - 1]) - fit.pixels)
-        shrunk = halves * np.clip((room / reach).min(axis=1), 0, 1)[:, None]
+        with np.errstate(divide="ignore", invalid="ignore"):  # no direction is known, or no size
+            shrunk = halves * np.clip((room / reach).min(axis=1), 0, 1)[:, None]
         shrunk[~(shrunk.min(axis=1) >= np.minimum(SMALLEST_HALF_WINDOW_PX, halves.min(axis=1)))] = np.nan
-        clear = np.maximum(self.clear * self.lengths - fit.blur_px[:, None], 1.0)
-        clear[np.isnan(shrunk)] = np.nan
-        return np.concatenate([shrunk, clear], axis=1)
+        if np.isinf(self.clear):
+            return np.concatenate([shrunk, np.full(shrunk.shape, np.inf)], axis=1)
+        return np.concatenate([shrunk, np.maximum(self.clear * self.lengths - fit.blur_px[:, None], 1.0)], axis=1)

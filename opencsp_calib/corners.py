@@ -18,6 +18,7 @@ from opencsp_calib.corner_grid import bends, edges
 from opencsp_calib.corner_judgement import moved, rejections, summary
 from opencsp_calib.corner_windows import FULL, NEAR, SMALL, Surroundings
 from opencsp_calib.detection import Detection
+from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 
 __all__ = ["prepare", "refine"]
@@ -42,10 +43,17 @@ def refine(image: Image, detection: Detection, board: Board) -> Detection:
     Detection
         The corners that look like corners, with covariance, edge width and contrast; the others in `rejected`, with the
         reason. A pixel's own width counts as blur: a perfectly sharp image has an edge width of 0.29 px.
+
+    Raises
+    ------
+    InputError
+        If a corner's id is not one of the board's.
     """
     if not len(detection):
         return detection
-    columns = board.grid[0]
+    columns, rows = board.grid
+    if not (detection.ids.min() >= 0 and detection.ids.max() < columns * rows):
+        raise InputError(f"the detection names a corner that the board, with {columns}x{rows}, does not have")
     vectors, lengths = edges(detection.pixels, detection.ids, columns)
     levels = np.ascontiguousarray(image.pixels, dtype=np.uint16)
     around = Surroundings(levels, image.white, lengths, np.zeros(lengths.shape), _clear(board))
@@ -107,5 +115,5 @@ def _full(around: Surroundings, near: CornerFit, where: Mask) -> CornerFit:
     disturbed = where & ~(fit.converged & (fit.misfit < CLEAN_MISFIT))
     small = around.fit(near, SMALL, disturbed)
     same = np.linalg.norm(small.pixels - fit.pixels, axis=1) < SAME_PLACE_PX
-    better = fit.converged & small.converged & same & (small.misfit < fit.misfit / 2)
+    better = fit.converged & small.converged & same & (small.misfit < 0.75 * fit.misfit)
     return fit.replaced(better, small[better])
