@@ -51,8 +51,16 @@ class BundleSolver:
 
         The residual covariance of the camera is filled in; the honest one is for `opencsp_calib.uncertainty`.
         """
+        from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]  # it has no types of its own
+
         # corners without a covariance are welcome: they count as the typical one of the others
         check_request(self, observations, model, replace(options, weights="equal"))
+        # BLAS threads wait for each other at every block of a factor: where another process has one of the cores, that
+        # takes ten times as long; on idle cores, matrices of this size hardly gain by them
+        with threadpool_limits(limits=1, user_api="blas"):
+            return self._solved(observations, model, options)
+
+    def _solved(self, observations: Observations, model: str, options: SolveOptions) -> Calibration:
         lens, given = LENS_MODELS[model], observations.board.points
         table = CornerTable.of(observations.detections, options.weights)
         estimate = _roughly(observations, model, options, table)
