@@ -51,7 +51,7 @@ class BundleSolver:
 
         The residual covariance of the camera is filled in; the honest one is for `opencsp_calib.uncertainty`.
         """
-        from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]  # it has no types of its own
+        from threadpoolctl import threadpool_limits
 
         # corners without a covariance are welcome: they count as the typical one of the others
         check_request(self, observations, model, replace(options, weights="equal"))
