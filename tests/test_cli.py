@@ -205,6 +205,13 @@ def test_check_tells_a_good_camera_from_a_bad_one(
     assert "--board SPEC" in complaint(capsys, "check", tmp_path / "good.h5", photographs)
 
 
+def test_check_takes_the_board_that_the_camera_was_calibrated_with(
+    photographs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    answer(capsys, "calibrate", photographs, "--board", SmallWorld.spec, "-o", tmp_path / "camera.h5")
+    assert answer(capsys, "check", tmp_path / "camera.h5", photographs)["verdict"] == "ok"
+
+
 @pytest.mark.parametrize("suffix", ["svg", "pdf", "png"])
 def test_a_board_is_drawn(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"board.{suffix}"

@@ -11,6 +11,7 @@ from opencsp_calib.cli.console import detection_progress, print_json, say, say_p
 from opencsp_calib.errors import FileFormatError, InputError
 
 if TYPE_CHECKING:
+    from opencsp_calib.board import Board
     from opencsp_calib.calibration import Calibration
     from opencsp_calib.detection import Observations
     from opencsp_calib.interfaces import Solver
@@ -60,8 +61,8 @@ def check(
     from opencsp_calib.check import check as checked
 
     known = camera_in(camera)
-    observations = _observed(images, board, jobs)
     calibration = calibration_in(camera)
+    observations = _observed(images, board, jobs, calibration.observations.board if calibration else None)
     covariance = calibration.covariance if calibration else None
     found = checked(known, observations, lambda views: pipeline.solve(views, known.model), covariance=covariance)
     say(f"{known.name}: {found.verdict}")
@@ -100,17 +101,22 @@ def _calibration(images: list[str], board: str | None, jobs: int | None) -> "Cal
     return pipeline.solve(_observed(images, board, jobs))
 
 
-def _observed(images: list[str], board: str | None, jobs: int | None) -> "Observations":
-    """What is seen in photographs, or what a file says was seen."""
+def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Board | None" = None) -> "Observations":
+    """What is seen in photographs, by default of the board that the camera was calibrated with; or what a file says.
+
+    That board is taken as it was given, not as it was solved: a shape solved together with the camera shares its
+    errors, and would hide them.
+    """
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
 
     if _is_file(images):
         return load_observations(images[0])
+    board = pipeline.board_from(spec) if spec else usual
     if board is None:
         raise InputError("photographs need --board SPEC, such as --board checkerboard:18x23:50mm")
     with detection_progress() as progress:
-        observations = pipeline.detect(images, pipeline.board_from(board), jobs=jobs, progress=progress)
+        observations = pipeline.detect(images, board, jobs=jobs, progress=progress)
     say_unused(observations)
     return observations
 
