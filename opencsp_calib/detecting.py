@@ -1,62 +1,39 @@
-"""Looking at many images at once: reading, finding, refining, in threads, in bounded memory, in order."""
+"""Looking at many images at once: several at a time, in bounded memory, in order, with nothing done twice."""
 
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from opencsp_calib.board import Board
 from opencsp_calib.corners import prepare
-from opencsp_calib.corners import refine as refine_by_model
-from opencsp_calib.detection import Detection, Observations, Problem, View
+from opencsp_calib.detection import Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
-from opencsp_calib.image import Image
-from opencsp_calib.images import ImageFile, opencv_on_one_thread, read_image
-from opencsp_calib.interfaces import Detector
-from opencsp_calib.photograph import problems_of
-from opencsp_calib.subpix import refine_subpix
+from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
+from opencsp_calib.looking import Look, Search
+from opencsp_calib.opencv import opencv_on_one_thread
 
-__all__ = ["Progress", "Refine", "Stop", "find_board", "look_at"]
+__all__ = ["Progress", "Stop", "look_at"]
 
-MIN_CORNERS = 6  # twelve numbers for the six of a pose: as many again to check it by
-
-Refine: TypeAlias = Literal["none", "subpix", "model"]
 Progress: TypeAlias = Callable[[int, int, View], None]
 Stop: TypeAlias = threading.Event
 
 
-@dataclass(frozen=True)
-class Look:
-    """A view, and the size of its image if that could be read."""
-
-    view: View
-    size: tuple[int, int] | None
-
-
 def look_at(
-    files: Sequence[ImageFile],
-    board: Board,
-    detector: Detector,
-    refine: Refine | None,
-    jobs: int,
-    progress: Progress | None = None,
-    stop: Stop | None = None,
+    files: Sequence[ImageFile], search: Search, jobs: int, progress: Progress | None = None, stop: Stop | None = None
 ) -> Observations:
     """Look for a board in image files, several at a time.
 
     Threads do the work, because reading, searching and fitting release Python's lock; so it also works in a plain
-    script. At most two images a thread are in memory.
+    script. At most one image a thread is in memory.
 
     Parameters
     ----------
     files : sequence of ImageFile
-    board : Board
-    detector : Detector
-    refine : 'none', 'subpix' or 'model', optional
-        By default 'model' where the detector finds corners of a checkerboard.
+    search : Search
     jobs : int
         Threads.
     progress, stop : optional
@@ -72,49 +49,23 @@ def look_at(
         If no image can be read.
     CancelledError
     """
-    if refine is None:
-        refine = "model" if detector.feature == "corner" else "none"
-    if refine == "model":
+    if search.refine == "model":
         prepare()  # loads the compiled fit while the first images are read
 
     def look(file: ImageFile) -> Look:
-        return _look(file, board, detector, refine)
+        return _look(file, search.look)
 
     with opencv_on_one_thread():
         looks = _in_threads(files, look, jobs, progress, stop)
-    return _gathered(looks, board)
+    return _gathered(looks, search.board)
 
 
-def find_board(image: Image, board: Board, detector: Detector, refine: Refine) -> Detection:
-    """The board's corners in an image, refined; nothing, with the reason, where they are too few."""
+def _look(file: ImageFile, examine: Callable[[EncodedImage], Look]) -> Look:
     try:
-        found = detector.detect(image, board)
-    except Exception as error:  # a stranger's code: one image must not stop the run
-        return Detection.nothing(f"the detector {detector.name!r} failed: {error!r}")
-    if not len(found):
-        return found
-    if refine == "subpix":
-        found = refine_subpix(image, found)
-    elif refine == "model":
-        found = refine_by_model(image, found, board)
-    if len(found) < MIN_CORNERS:
-        reason = f"only {len(found)} of {len(board.points)} corners can be trusted"
-        return replace(Detection.nothing(reason), rejected=found.rejected)
-    return found
-
-
-def _look(file: ImageFile, board: Board, detector: Detector, refine: Refine) -> Look:
-    try:
-        image = read_image(file)
+        encoded = read_encoded(file)
     except InputError as error:
-        reason = str(error)
-        return Look(View(file.name, Detection.nothing(reason), "unreadable", (Problem("unreadable", reason),)), None)
-    detection = find_board(image, board, detector, refine)
-    if not len(detection):
-        problems: tuple[Problem, ...] = (Problem("no-board", detection.reason),)
-        return Look(View(file.name, detection, "no board", problems, image.sha256), image.size)
-    problems = problems_of(image, detection, board)
-    return Look(View(file.name, detection, "used", problems, image.sha256), image.size)
+        return Look.unreadable(file.name, str(error))
+    return examine(encoded)
 
 
 def _in_threads(

@@ -1,6 +1,7 @@
 """Image files: which there are, and their grey levels exactly as the sensor gave them.
 
-The only place in the core that touches OpenCV, and only inside functions.
+With `opencsp_calib.opencv` and `opencsp_calib.subpix` the only place in the core that touches OpenCV, and only inside
+functions.
 """
 
 import glob
@@ -8,9 +9,8 @@ import hashlib
 import os
 import re
 import stat
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,18 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opencsp_calib.atomic import replacing
-from opencsp_calib.errors import InputError, MissingDependencyError
+from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
+from opencsp_calib.opencv import opencv
 
 if TYPE_CHECKING:
     from opencsp_calib.camera import Camera
 
 __all__ = [
     "EXTENSIONS",
+    "EncodedImage",
     "ImageFile",
+    "decode_image",
     "encode_thumbnail",
     "find_images",
-    "opencv_on_one_thread",
+    "read_encoded",
     "read_image",
     "undistort",
     "write_image",
@@ -52,6 +55,23 @@ class ImageFile:
 
     name: str
     path: Path
+
+
+@dataclass(frozen=True)
+class EncodedImage:
+    """An image file as it lies on the disk: not yet decoded, but known by its contents.
+
+    Parameters
+    ----------
+    file : ImageFile
+    data : bytes
+    sha256 : str
+        Of the bytes, hexadecimal.
+    """
+
+    file: ImageFile
+    data: bytes = field(repr=False)
+    sha256: str
 
 
 def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]]) -> tuple[ImageFile, ...]:
@@ -106,9 +126,6 @@ def _natural(path: Path) -> list[tuple[int, str]]:
 def read_image(file: ImageFile) -> Image:
     """The grey levels of an image file, 8 or 16 bit, colour turned to grey.
 
-    The pixels stay as the sensor has them: an orientation noted in the file (EXIF), which would turn them and swap
-    width and height, is not followed.
-
     Raises
     ------
     InputError
@@ -116,7 +133,17 @@ def read_image(file: ImageFile) -> Image:
     MissingDependencyError
         If OpenCV is not installed.
     """
-    cv2 = _opencv()
+    return decode_image(read_encoded(file))
+
+
+def read_encoded(file: ImageFile) -> EncodedImage:
+    """The bytes of an image file.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is empty.
+    """
     try:
         if not stat.S_ISREG(file.path.stat().st_mode):
             raise InputError(f"{file.path} is not a regular file")
@@ -127,18 +154,36 @@ def read_image(file: ImageFile) -> Image:
         raise InputError(f"{file.path} cannot be read: {error.strerror}") from None
     if not data:
         raise InputError(f"{file.path} is empty")
+    return EncodedImage(file, data, hashlib.sha256(data).hexdigest())
+
+
+def decode_image(encoded: EncodedImage) -> Image:
+    """The grey levels in an image file's bytes.
+
+    The pixels stay as the sensor has them: an orientation noted in the file (EXIF), which would turn them and swap
+    width and height, is not followed.
+
+    Raises
+    ------
+    InputError
+        If they are cut short, or no image.
+    MissingDependencyError
+        If OpenCV is not installed.
+    """
+    cv2 = opencv()
+    path, data = encoded.file.path, encoded.data
     if _cut_short(data):
-        raise InputError(f"{file.path} is cut short; copy it again from the camera")
+        raise InputError(f"{path} is cut short; copy it again from the camera")
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
     except cv2.error as error:
-        raise InputError(f"{file.path} cannot be read as an image: {error.err}") from None
+        raise InputError(f"{path} cannot be read as an image: {error.err}") from None
     if pixels is None:
-        raise InputError(f"{file.path} cannot be read as an image; it is damaged or of an unknown kind")
+        raise InputError(f"{path} cannot be read as an image; it is damaged or of an unknown kind")
     if pixels.dtype not in (np.uint8, np.uint16):
-        raise InputError(f"{file.path} has {pixels.dtype} pixels; save it with 8 or 16 bits")
-    return Image(file.name, pixels, hashlib.sha256(data).hexdigest())
+        raise InputError(f"{path} has {pixels.dtype} pixels; save it with 8 or 16 bits")
+    return Image(encoded.file.name, pixels, encoded.sha256)
 
 
 def _cut_short(data: bytes) -> bool:
@@ -163,7 +208,7 @@ def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:
     InputError
         If it cannot be written.
     """
-    cv2 = _opencv()
+    cv2 = opencv()
     done, data = cv2.imencode(".png", pixels, [cv2.IMWRITE_PNG_COMPRESSION, 1])
     if not done:
         raise InputError(f"cannot write {path}: not an image of 8 or 16 bits")
@@ -173,7 +218,7 @@ def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:
 
 def encode_thumbnail(pixels: NDArray[Any], side: int) -> bytes:
     """A small JPEG of grey levels, at most `side` pixels either way, 16 bits brought to 8."""
-    cv2 = _opencv()
+    cv2 = opencv()
     scale = min(1.0, side / max(pixels.shape[:2]))
     small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA) if scale < 1 else pixels
     if small.dtype == np.uint16:
@@ -205,7 +250,7 @@ def undistort(image: NDArray[Any], camera: "Camera", target: "Camera | None" = N
     """
     from opencsp_calib.camera import Camera
 
-    cv2 = _opencv()
+    cv2 = opencv()
     height, width = image.shape[:2]
     if (width, height) != camera.image_size:
         size = "x".join(map(str, camera.image_size))
@@ -216,24 +261,3 @@ def undistort(image: NDArray[Any], camera: "Camera", target: "Camera | None" = N
     source = camera.project(rays).astype(np.float32).reshape(*x.shape, 2)
     source[np.isnan(source)] = -1e6  # outside, so that it becomes 0
     return np.asarray(cv2.remap(image, source[..., 0], source[..., 1], cv2.INTER_LINEAR))
-
-
-@contextmanager
-def opencv_on_one_thread() -> Iterator[None]:
-    """OpenCV's own threads off while ours are at work, so that they do not fight over the cores; then as before."""
-    cv2 = _opencv()
-    before = cv2.getNumThreads()
-    cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        cv2.setNumThreads(before)
-
-
-def _opencv() -> Any:
-    try:
-        import cv2
-    except ImportError as error:
-        message = f"OpenCV cannot be imported ({error}); pip install 'opencsp-calib[opencv]'"
-        raise MissingDependencyError(message) from None
-    return cv2

@@ -16,12 +16,13 @@ from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.detecting import Progress, Refine, Stop, look_at
+from opencsp_calib.detecting import Progress, Stop, look_at
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
 from opencsp_calib.interfaces import Solver
+from opencsp_calib.looking import Refine, Search
 from opencsp_calib.models import lens_model
 from opencsp_calib.options import BoardShape, SolveOptions, Weights
 from opencsp_calib.registry import installed
@@ -99,7 +100,8 @@ def detect(
     finder = registry.detector(detector) if detector else registry.detector_for(board)
     if not finder.supports(board):
         raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}")
-    return look_at(files, board, finder, refine, jobs or usable_cores(), progress, stop)
+    search = Search(board, finder, refine or ("model" if finder.feature == "corner" else "none"))
+    return look_at(files, search, jobs or usable_cores(), progress, stop)
 
 
 def solve(

@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors",
-    "arrays atomic",
+    "arrays atomic opencv",
     "models",
     "camera pose board",
     "image detection options",
@@ -29,7 +29,9 @@ TIERS = (
     "interfaces",
     "solving importing hookspecs",
     "registry",
-    "detecting conformance",
+    "looking conformance",
+    "journal cluster",
+    "detecting",
     "pipeline demo",
     "trials validate check coach fleet",
     "report",

@@ -11,9 +11,9 @@ from opencsp_calib import CalibrationFailedError, InputError, Observations, Solv
 from opencsp_calib.arrays import Floats, Params
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.convergence import judged
-from opencsp_calib.images import opencv_on_one_thread
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.solving import check_request, finished
 from opencsp_calib_opencv.available import missing_opencv
 

@@ -15,7 +15,8 @@ from opencsp_calib_opencv.charuco import CharucoDetector
 
 from opencsp_calib import CharucoBoard, Detection, Image
 from opencsp_calib.errors import InputError
-from opencsp_calib.images import find_images, opencv_on_one_thread, read_image
+from opencsp_calib.images import find_images, read_image
+from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.rendering import Exposure, Scene, Spot
 
 CALISCOPE = CharucoKind().parse("charuco:4x5:54mm:40.5mm:DICT_4X4_50:inverted")

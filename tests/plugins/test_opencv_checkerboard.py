@@ -15,7 +15,8 @@ from opencsp_calib_opencv.opencsp import OpenCSPDetector
 
 from opencsp_calib import Checkerboard, Detection, Image
 from opencsp_calib.errors import InputError
-from opencsp_calib.images import find_images, opencv_on_one_thread, read_image
+from opencsp_calib.images import find_images, read_image
+from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.rendering import Exposure, Scene, Spot
 
 BOARD = Checkerboard(9, 6, 0.05)
