@@ -96,13 +96,18 @@ COMMANDS = (board, demo, plugins)
 
 
 def print_versions() -> None:
-    """Ours, Python's, and those of the engines, for bug reports."""
+    """Ours, Python's, and those of plugins and engines, for bug reports."""
     import platform
-    from importlib.metadata import version
+    from importlib.metadata import entry_points, version
 
+    from opencsp_calib.hookspecs import GROUP
     from opencsp_calib.registry import installed
 
     typer.echo(f"opencsp-calib {version('opencsp-calib')}, Python {platform.python_version()}, {platform.platform()}")
+    typer.echo(", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py", "numba")))
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        origin = f"{point.dist.name} {point.dist.version}" if point.dist else point.value
+        typer.echo(f"plugin {point.name}: {origin}")
     for name, solver in sorted(installed().solvers.items()):
         typer.echo(f"solver {name}: {solver.missing() or solver.version()}")
 

@@ -65,7 +65,7 @@ def refuses_what_it_cannot_understand(kind: BoardKind, setup: Setup) -> None:
 
 
 def draws_its_corners_where_they_are(kind: BoardKind, setup: Setup) -> None:
-    """Everything drawn is on the page, and at every corner edges meet; of a checkerboard, four squares in turn."""
+    """Everything drawn is on the page, and something at every corner; of a checkerboard, four squares in turn."""
     for spec in _specs(kind, setup):
         board = kind.parse(spec)
         drawing = kind.draw(board)
@@ -77,8 +77,10 @@ def draws_its_corners_where_they_are(kind: BoardKind, setup: Setup) -> None:
         )
         promise(drawing.rectangles and inside, f"{spec}: what it draws is not all on the page")
         corners = board.points[:, :2] + drawing.origin_m
-        around = _around(drawing, corners, board.spacing_m)
-        met = ~(around == around[:, :1]).all(axis=1)
+        around = _around(drawing, corners, BESIDE * board.spacing_m)
+        # a corner's edges meet next to it; a disc, whose middle counts, ends before the next one begins
+        near = np.hstack([around, _around(drawing, corners, 0.5 * board.spacing_m)])
+        met = ~(near == near[:, :1]).all(axis=1)
         promise(met.all(), f"{spec}: at {(~met).sum()} of {len(met)} corners nothing is drawn")
         if isinstance(board, Checkerboard | CharucoBoard):
             promise(
@@ -102,9 +104,9 @@ def _specs(kind: BoardKind, setup: Setup) -> tuple[str, ...]:
     return specs
 
 
-def _around(drawing: Drawing, corners: Floats, spacing_m: float) -> Mask:
+def _around(drawing: Drawing, corners: Floats, beside_m: float) -> Mask:
     """(K, 4) whether it is dark to the upper left, upper right, lower left and lower right of each corner (K, 2)."""
-    sides = BESIDE * spacing_m * np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+    sides = beside_m * np.array([[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
     x, y = np.moveaxis(corners[:, None, :] + sides, 2, 0)
     dark = np.full(x.shape, drawing.dark)
     for r in drawing.rectangles:

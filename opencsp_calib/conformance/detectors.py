@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from opencsp_calib.arrays import Floats, Ids
 from opencsp_calib.board import Board
 from opencsp_calib.camera import Camera
 from opencsp_calib.conformance.kit import Setup, promise
@@ -120,13 +121,21 @@ def _promise_found(detector: Detector, board: Board, roll_deg: float, tilt_deg: 
     count = len(board.points)
     promise(len(seen) >= 0.9 * count, f"{where}: {len(seen)} of {count} corners, {seen.reason or 'and no reason'}")
     promise(seen.ids.min() >= 0 and seen.ids.max() < count, f"{where}: it names corners that the board does not have")
-    off = np.linalg.norm(seen.pixels - CAMERA.project(pose.transform(board.points[seen.ids])), axis=1)
+    off = _off(seen, board, pose, seen.ids)
+    if board.symmetric:  # nothing tells from which end its ids begin
+        off = min(off, _off(seen, board, pose, count - 1 - seen.ids), key=np.max)
     allowed = NEAR_PX[detector.feature]
     promise(
         off.max() <= allowed,
         f"{where}: corners are up to {off.max():.3g} px from where they are, allowed are {allowed:g} px "
         "(half a pixel: is a pixel's centre at 0? hundreds: are ids those of the board?)",
     )
+
+
+def _off(seen: Detection, board: Board, pose: Pose, ids: Ids) -> Floats:
+    """(n,) px how far the corners are from where those of these ids are rendered."""
+    rendered = CAMERA.project(pose.transform(board.points[ids]))
+    return np.asarray(np.linalg.norm(seen.pixels - rendered, axis=1))
 
 
 def _rendered(board: Board, roll_deg: float, tilt_deg: float) -> tuple[Image, Pose]:

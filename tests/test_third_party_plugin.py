@@ -1,0 +1,94 @@
+"""A stranger's distribution, docs/example_plugin, installed by pip as anybody would: found, conforming, removable.
+
+It goes into an environment of its own, made for the test, which borrows the packages of this one.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+import pytest
+
+EXAMPLE = Path(__file__).resolve().parents[1] / "docs" / "example_plugin"
+BROKEN = """
+[build-system]
+requires = ["hatchling"]
+build-backend = "hatchling.build"
+[project]
+name = "broken-plugin"
+version = "0.3"
+[project.entry-points.opencsp_calib]
+broken = "broken_plugin"
+[tool.hatch.build.targets.wheel]
+only-include = ["broken_plugin.py"]
+"""
+
+
+class Environment:
+    """A throw-away environment that pip of this one installs into, without asking the network for anything."""
+
+    def __init__(self, folder: Path) -> None:
+        venv.create(folder, with_pip=False)
+        self.python = str(next(folder.glob("[bS]*/python*")))
+        borrowed = "\n".join(path for path in sys.path if path and Path(path).is_dir())
+        site = self.run("-c", "import sysconfig; print(sysconfig.get_path('purelib'))").stdout.strip()
+        (Path(site) / "borrowed.pth").write_text(borrowed)
+
+    def run(self, *arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
+        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COV"))}
+        done = subprocess.run([self.python, *arguments], capture_output=True, text=True, timeout=250, env=kept)
+        assert done.returncode == code, done.stdout + done.stderr
+        return done
+
+    def pip(self, *arguments: str) -> None:
+        command = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", self.python]
+        done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=250)
+        assert done.returncode == 0, done.stderr
+
+    def install(self, project: Path) -> None:
+        self.pip("install", "--no-index", "--no-deps", "--no-build-isolation", str(project))
+
+    def plugins(self) -> set[tuple[str, str]]:
+        listed = json.loads(self.run("-m", "opencsp_calib", "plugins", "--json").stdout)
+        return {(entry["kind"], entry["name"]) for entry in listed}
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> Environment:
+    pytest.importorskip("hatchling", reason="the example is built with hatchling")
+    return Environment(tmp_path / "environment")
+
+
+def test_the_example_is_found_keeps_its_promises_and_goes_away_again(environment: Environment, tmp_path: Path) -> None:
+    provided = {("board", "circles"), ("detector", "circles"), ("camera format", "open3d")}
+    before = environment.plugins()
+    assert not provided & before
+    example = shutil.copytree(EXAMPLE, tmp_path / "example", ignore=shutil.ignore_patterns("__pycache__"))
+    environment.install(example)
+    assert environment.plugins() == before | provided
+    assert "plugin circles: opencsp-calib-circles 1.0" in environment.run("-m", "opencsp_calib", "--version").stdout
+    pdf = tmp_path / "board.pdf"
+    environment.run("-m", "opencsp_calib", "board", "circles:7x5:30mm:14mm", "-o", str(pdf))
+    assert pdf.read_bytes().startswith(b"%PDF")
+    tests = environment.run("-m", "pytest", "-q", "-p", "no:cacheprovider", str(example / "tests"))
+    assert " passed" in tests.stdout
+    environment.pip("uninstall", "--yes", "opencsp-calib-circles")
+    assert environment.plugins() == before
+
+
+def test_a_broken_one_is_left_out_with_a_warning(environment: Environment, tmp_path: Path) -> None:
+    before = environment.plugins()
+    project = tmp_path / "broken"
+    project.mkdir()
+    (project / "pyproject.toml").write_text(BROKEN)
+    (project / "broken_plugin.py").write_text("import a_package_that_nobody_has\n")
+    environment.install(project)
+    said = environment.run("-m", "opencsp_calib", "plugins").stderr
+    assert "warning: plugin 'broken' (broken_plugin) was left out" in said
+    assert "a_package_that_nobody_has" in said
+    assert environment.plugins() == before
+    assert "plugin broken: broken-plugin 0.3" in environment.run("-m", "opencsp_calib", "--version").stdout
