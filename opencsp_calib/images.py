@@ -32,6 +32,7 @@ __all__ = [
     "decode_image",
     "encode_thumbnail",
     "find_images",
+    "images_in",
     "read_encoded",
     "read_image",
     "undistort",
@@ -103,7 +104,7 @@ def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
 def _expanded(text: str) -> list[Path]:
     path = Path(text)
     if path.is_dir():
-        found = sorted((p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and p.is_file()), key=_natural)
+        found = images_in(path)
         if not found:
             raise InputError(f"the folder {path} has no image files ({', '.join(EXTENSIONS)})")
         return found
@@ -115,6 +116,12 @@ def _expanded(text: str) -> list[Path]:
             raise InputError(f"no file matches {text}")
         return found
     raise InputError(f"no such file or folder: {path}")
+
+
+def images_in(folder: Path) -> list[Path]:
+    """The image files of a folder by extension, sorted naturally; not hidden ones, such as files being written."""
+    files = (path for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS and not path.name.startswith("."))
+    return sorted((path for path in files if path.is_file()), key=_natural)
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
