@@ -1,42 +1,52 @@
 """Looking at many images at once: several at a time, in bounded memory, in order, with nothing done twice."""
 
+import os
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import ExitStack
 from dataclasses import replace
 from itertools import islice
 from typing import TypeAlias
 
 from opencsp_calib.board import Board
+from opencsp_calib.cluster import Scheduler, connected
 from opencsp_calib.corners import prepare
 from opencsp_calib.detection import Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
 from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
+from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
 
-__all__ = ["Progress", "Stop", "look_at"]
+__all__ = ["Progress", "Stop", "look_at", "usable_cores"]
 
 Progress: TypeAlias = Callable[[int, int, View], None]
 Stop: TypeAlias = threading.Event
 
 
 def look_at(
-    files: Sequence[ImageFile], search: Search, jobs: int, progress: Progress | None = None, stop: Stop | None = None
+    files: Sequence[ImageFile],
+    search: Search,
+    jobs: int | None = None,
+    progress: Progress | None = None,
+    stop: Stop | None = None,
+    journal: Journal | None = None,
+    scheduler: "Scheduler | None" = None,
 ) -> Observations:
     """Look for a board in image files, several at a time.
 
     Threads do the work, because reading, searching and fitting release Python's lock; so it also works in a plain
-    script. At most one image a thread is in memory.
+    script. At most one image a thread is in memory. With a Dask cluster, each thread waits for a worker that does it.
 
     Parameters
     ----------
     files : sequence of ImageFile
     search : Search
-    jobs : int
-        Threads.
-    progress, stop : optional
+    jobs : int, optional
+        Threads; by default one a core, and with a cluster twice as many as its workers have.
+    progress, stop, journal, scheduler : optional
         See `opencsp_calib.pipeline.detect`.
 
     Returns
@@ -46,35 +56,54 @@ def look_at(
     Raises
     ------
     InputError
-        If no image can be read.
+        If no image can be read, or the cluster cannot be used.
     CancelledError
     """
-    if search.refine == "model":
-        prepare()  # loads the compiled fit while the first images are read
-
-    def look(file: ImageFile) -> Look:
-        return _look(file, search.look)
-
-    with opencv_on_one_thread():
-        looks = _in_threads(files, look, jobs, progress, stop)
+    ended = threading.Event()
+    with ExitStack() as stack:
+        stack.enter_context(opencv_on_one_thread())
+        if journal is not None:
+            stack.enter_context(journal.open(search.key))
+        if scheduler is not None:
+            cluster = stack.enter_context(connected(scheduler, search, ended))
+            examine, threads = cluster.look, jobs or cluster.in_flight
+        else:
+            examine, threads = search.look, jobs or usable_cores()
+            if search.refine == "model":
+                prepare()  # loads the compiled fit while the first images are read
+        looks = _in_threads(files, lambda file: _look(file, examine, journal), threads, ended, progress, stop)
     return _gathered(looks, search.board)
 
 
-def _look(file: ImageFile, examine: Callable[[EncodedImage], Look]) -> Look:
+def usable_cores() -> int:
+    """How many cores this process may use."""
+    affinity = getattr(os, "sched_getaffinity", None)  # not on Windows and macOS
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+def _look(file: ImageFile, examine: Callable[[EncodedImage], Look], journal: Journal | None) -> Look:
     try:
         encoded = read_encoded(file)
     except InputError as error:
         return Look.unreadable(file.name, str(error))
-    return examine(encoded)
+    if journal is None:
+        return examine(encoded)
+    known = journal.find(encoded.sha256, file.name)
+    if known is None:
+        known = examine(encoded)
+        journal.add(known)
+    return known
 
 
 def _in_threads(
     files: Sequence[ImageFile],
     look: Callable[[ImageFile], Look],
     jobs: int,
+    ended: threading.Event,
     progress: Progress | None,
     stop: Stop | None,
 ) -> list[Look]:
+    """In order; `ended` is set as soon as nobody wants what is still under way."""
     looks: dict[int, Look] = {}
     waiting_files = iter(enumerate(files))
     running: dict[Future[Look], int] = {}
@@ -92,6 +121,7 @@ def _in_threads(
                 if progress:
                     progress(len(looks), len(files), looks[index].view)
     finally:
+        ended.set()
         pool.shutdown(cancel_futures=True)
     return [looks[index] for index in range(len(files))]
 

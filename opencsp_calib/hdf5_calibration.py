@@ -32,7 +32,7 @@ JSON stands for a string dataset with JSON in it. Two files are equal when every
 import json
 import os
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -40,18 +40,17 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard, RecordedBoard
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.detection import Detection, Observations, Problem, RejectedCorner, Status, View
+from opencsp_calib.detection import Observations
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera, written
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
+from opencsp_calib.view_json import OPTIONAL, problems_as_json, problems_from_json, view_as_json, view_from_json
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = ["load_calibration", "load_observations", "save_calibration", "save_observations"]
-
-OPTIONAL = ("covariance", "edge_width_px", "contrast")
 
 
 def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
@@ -74,7 +73,7 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         group["covariance_residual"] = calibration.covariance_residual
         group["solver"] = calibration.solver
         group["options"] = json.dumps(_options_as_json(calibration.options))
-        group["problems"] = json.dumps(_problems_as_json(calibration.problems))
+        group["problems"] = json.dumps(problems_as_json(calibration.problems))
         group["record"] = json.dumps(dict(calibration.record))
         group["provenance"] = json.dumps(dict(calibration.provenance))
 
@@ -105,7 +104,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             outliers=tuple(np.split(_array(group, "outliers", (None,)).astype(bool), ends)),
             covariance=read_dataset(group, "covariance"),
             covariance_residual=read_dataset(group, "covariance_residual"),
-            problems=_problems_from_json(_json(group, "problems")),
+            problems=problems_from_json(_json(group, "problems")),
             record={str(key): str(value) for key, value in _json(group, "record").items()},
             provenance=_json(group, "provenance"),
         )
@@ -139,11 +138,11 @@ def _write_observations(observations: Observations, group: "h5py.Group") -> None
         | _charuco_fields(board)
     )
     group["board_points"] = board.points
-    group["views"] = json.dumps([_view_as_json(view) for view in views])
+    group["views"] = json.dumps([view_as_json(view) for view in views])
     group["corners"] = np.array([len(view.detection) for view in views], dtype=np.int32)
     group["ids"] = np.concatenate([np.empty(0, dtype=np.int64), *(view.detection.ids for view in views)])
     group["pixels"] = np.concatenate([np.empty((0, 2)), *(view.detection.pixels for view in views)])
-    for name, shape in zip(OPTIONAL, ((2, 2), (), ()), strict=True):
+    for name, shape in OPTIONAL.items():
         known = [_or_nan(getattr(view.detection, name), (len(view.detection), *shape)) for view in views]
         group[name] = np.concatenate([np.empty((0, *shape)), *known])
 
@@ -155,39 +154,17 @@ def _read_observations(group: "h5py.Group") -> Observations:
     ends = np.cumsum(counts)[:-1]
     names = ("ids", "pixels", *OPTIONAL)
     columns = {name: np.split(np.asarray(read_dataset(group, name)), ends) for name in names}
+    known = {name: [None if np.isnan(values).all() else values for values in columns[name]] for name in OPTIONAL}
+    arrays: dict[str, list[Any]] = {**columns, **known}
     described = _json(group, "views")
     if len(described) != len(counts):
         raise FileFormatError(f"{group.file.filename}: {len(described)} views, but corners of {len(counts)}")
     views = tuple(
-        _view_from_json(entry, {name: columns[name][index] for name in names}) for index, entry in enumerate(described)
+        view_from_json(entry, {name: arrays[name][index] for name in names}) for index, entry in enumerate(described)
     )
     width, height = (int(side) for side in read_dataset(group, "image_size"))
     board = _board_from_json(_json(group, "board"), _array(group, "board_points", (None, 3)))
     return Observations(board, (width, height), views)
-
-
-def _view_as_json(view: View) -> dict[str, Any]:
-    rejected = [[corner.id, *corner.pixel, corner.reason] for corner in view.detection.rejected]
-    return {
-        "image": view.image,
-        "sha256": view.sha256,
-        "status": view.status,
-        "problems": _problems_as_json(view.problems),
-        "reason": view.detection.reason,
-        "rejected": rejected,
-    }
-
-
-def _view_from_json(entry: Mapping[str, Any], columns: Mapping[str, Floats]) -> View:
-    if entry["status"] not in get_args(Status):
-        raise FileFormatError(f"the view {entry['image']!r} has the unknown status {entry['status']!r}")
-    known = {name: None if np.isnan(columns[name]).all() else columns[name] for name in OPTIONAL}
-    rejected = tuple(RejectedCorner(int(i), (float(x), float(y)), str(why)) for i, x, y, why in entry["rejected"])
-    detection = Detection(
-        columns["ids"].astype(np.int64), columns["pixels"], **known, rejected=rejected, reason=str(entry["reason"])
-    )
-    problems = _problems_from_json(entry["problems"])
-    return View(str(entry["image"]), detection, entry["status"], problems, str(entry["sha256"]))
 
 
 def _charuco_fields(board: Board) -> dict[str, Any]:
@@ -223,14 +200,6 @@ def _options_from_json(entry: Mapping[str, Any]) -> SolveOptions:
     guess = entry["guess"]
     camera = guess and Camera(str(guess[0]), str(guess[1]), guess[2], (guess[3][0], guess[3][1]))
     return SolveOptions(camera, entry["board_shape"], entry["pixel_aspect"], entry["weights"], bool(entry["robust"]))
-
-
-def _problems_as_json(problems: tuple[Problem, ...]) -> list[list[str]]:
-    return [[problem.code, problem.message] for problem in problems]
-
-
-def _problems_from_json(entries: list[list[str]]) -> tuple[Problem, ...]:
-    return tuple(Problem(str(code), str(message)) for code, message in entries)
 
 
 def _json(group: "h5py.Group", name: str) -> Any:

@@ -16,12 +16,14 @@ from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
+from opencsp_calib.cluster import Scheduler
 from opencsp_calib.detecting import Progress, Stop, look_at
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
 from opencsp_calib.interfaces import Solver
+from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Refine, Search
 from opencsp_calib.models import lens_model
 from opencsp_calib.options import BoardShape, SolveOptions, Weights
@@ -33,6 +35,7 @@ __all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "board_from", "cali
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
 MIN_VIEWS = 3
+OF_DETECT = ("detector", "refine", "jobs", "progress", "stop", "journal", "scheduler")
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
 PixelAspect: TypeAlias = Literal["free", "square"] | float
@@ -63,6 +66,8 @@ def detect(
     jobs: int | None = None,
     progress: Progress | None = None,
     stop: Stop | None = None,
+    journal: Journal | None = None,
+    scheduler: "Scheduler | None" = None,
 ) -> Observations:
     """Find a board in photographs.
 
@@ -82,6 +87,11 @@ def detect(
         Called with the number of images done, their total, and the last view.
     stop : threading.Event, optional
         Set it to stop.
+    journal : Journal, optional
+        Where what is found is kept as it comes, and taken from if an earlier run was interrupted.
+    scheduler : str or distributed.Client, optional
+        A Dask cluster whose workers do the work: an address such as ``tcp://10.0.0.5:8786``, or a client. Dask's
+        messages are pickles, so that it must be one to be trusted.
 
     Returns
     -------
@@ -101,7 +111,7 @@ def detect(
     if not finder.supports(board):
         raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}")
     search = Search(board, finder, refine or ("model" if finder.feature == "corner" else "none"))
-    return look_at(files, search, jobs or usable_cores(), progress, stop)
+    return look_at(files, search, jobs, progress, stop, journal, scheduler)
 
 
 def solve(
@@ -197,7 +207,7 @@ def calibrate(
     images: Images, board: Board, model: str = DEFAULT_MODEL, solver: str = DEFAULT_SOLVER, **options: Any
 ) -> Calibration:
     """Photographs to a calibration: `detect`, then `solve`, whose options it takes by name."""
-    of_detect = {key: options.pop(key) for key in ("detector", "refine", "jobs", "progress", "stop") if key in options}
+    of_detect = {key: options.pop(key) for key in OF_DETECT if key in options}
     options.setdefault("provenance", places_of(images))
     return solve(detect(images, board, **of_detect), model, solver, **options)
 
@@ -222,12 +232,6 @@ def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
     solvers = sorted(installed().solvers.values(), key=lambda solver: solver.name)
     able = [s.name for s in solvers if model in s.models and options.asked <= s.abilities and s.missing() is None]
     raise InputError(f"the solver {engine.name!r} {what}; solvers that are able: {', '.join(able) or 'none installed'}")
-
-
-def usable_cores() -> int:
-    """How many cores this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)  # not on Windows and macOS
-    return len(affinity(0)) if affinity else os.cpu_count() or 1
 
 
 def _check_views(observations: Observations) -> None:

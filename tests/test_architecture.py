@@ -18,6 +18,7 @@ TIERS = (
     "models",
     "camera pose board",
     "image detection options",
+    "view_json",
     "calibration",
     "images corner_table unknowns triangular schur normal_equations subpix",
     "corner_kernel compiled corner_grid corner_windows corner_fit corner_judgement corners",

@@ -36,6 +36,17 @@ Report = Annotated[Path | None, typer.Option(metavar="FILE", help="An HTML repor
 Jobs = Annotated[
     int | None, typer.Option(min=1, max=1024, metavar="N", help="Images at a time; by default one per core.")
 ]
+Resume = Annotated[
+    bool, typer.Option("--resume", help="Go on from what an interrupted run has done: it is kept in FILE.journal.")
+]
+SchedulerAddress = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Look at images on a Dask cluster that you trust: its scheduler, such as tcp://10.0.0.5:8786.",
+    ),
+]
 DetectorName = Annotated[str | None, typer.Option("--detector", metavar="NAME", help="Which detector looks for it.")]
 RefineBy = Annotated[
     Literal["none", "subpix", "model"] | None,

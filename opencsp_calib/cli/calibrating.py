@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table, say_unused
+from opencsp_calib.cli.console import print_json, say, say_problems, say_table
+from opencsp_calib.cli.finding import detected_aloud, kept_beside
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
@@ -57,6 +58,8 @@ def calibrate(
         list[str] | None, typer.Option(metavar="KEY=VALUE", help="To keep with the camera: focus, aperture ...")
     ] = None,
     jobs: args.Jobs = None,
+    resume: args.Resume = False,
+    scheduler: args.SchedulerAddress = None,
     output: args.Output = None,
     report: args.Report = None,
     json: args.Json = False,
@@ -83,10 +86,6 @@ def calibrate(
     files = find_images(images)
     _check_not_input(files, output, report)
     record = _record(note or [], pixel_pitch)
-    with detection_progress() as progress:
-        observations = pipeline.detect(images, target, jobs=jobs, progress=progress, **finding)
-    say_unused(observations)
-    detected = time.perf_counter()
     options |= args.given(guess=args.guess_from(guess))
     options |= {
         "name": name or files[0].path.absolute().parent.name,
@@ -97,14 +96,17 @@ def calibrate(
     def run(views: "Observations") -> "Calibration":
         return pipeline.solve(views, **options)
 
-    observations = dropping.excluding(observations, exclude or [])
-    first = run(observations)
-    result = dropping.drop_worst(first, drop_worst, run) if drop_worst else first
-    result = dropping.drop_above(result, max_rms, run) if max_rms is not None else result
-    solved = time.perf_counter()
-    seconds = {"detect": detected - started, "solve": solved - detected, "total": solved - started}
-    before = first if result is not first else None
-    _finish(result, before, seconds, output, report, json)
+    with kept_beside(output, resume) as journal:
+        observations = detected_aloud(images, target, jobs=jobs, journal=journal, scheduler=scheduler, **finding)
+        detected = time.perf_counter()
+        observations = dropping.excluding(observations, exclude or [])
+        first = run(observations)
+        result = dropping.drop_worst(first, drop_worst, run) if drop_worst else first
+        result = dropping.drop_above(result, max_rms, run) if max_rms is not None else result
+        solved = time.perf_counter()
+        seconds = {"detect": detected - started, "solve": solved - detected, "total": solved - started}
+        before = first if result is not first else None
+        _finish(result, before, seconds, output, report, json)
 
 
 def detect(
@@ -114,6 +116,8 @@ def detect(
     detector: args.DetectorName = None,
     refine: args.RefineBy = None,
     jobs: args.Jobs = None,
+    resume: args.Resume = False,
+    scheduler: args.SchedulerAddress = None,
     json: args.Json = False,
 ) -> None:
     """Find the board in photographs, and keep what was found for `solve`."""
@@ -124,12 +128,12 @@ def detect(
 
     check_writable(output)
     started = time.perf_counter()
-    with detection_progress() as progress:
-        found = pipeline.detect(
-            images, pipeline.board_from(board), jobs=jobs, progress=progress, detector=detector, refine=refine
+    target = pipeline.board_from(board)
+    with kept_beside(output, resume) as journal:
+        found = detected_aloud(
+            images, target, journal, jobs=jobs, scheduler=scheduler, detector=detector, refine=refine
         )
-    say_unused(found)
-    save_observations(found, output)
+        save_observations(found, output)
     seconds = {"detect": time.perf_counter() - started}
     say(f"{_count(found)}; saved {output}")
     if json:

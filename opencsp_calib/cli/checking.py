@@ -7,7 +7,8 @@ import typer
 
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.cameras import CameraFile, calibration_in, camera_in
-from opencsp_calib.cli.console import detection_progress, print_json, say, say_problems, say_table, say_unused
+from opencsp_calib.cli.console import print_json, say, say_problems, say_table
+from opencsp_calib.cli.finding import detected_aloud
 from opencsp_calib.errors import FileFormatError, InputError
 
 if TYPE_CHECKING:
@@ -115,10 +116,7 @@ def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Boa
     board = pipeline.board_from(spec) if spec else usual
     if board is None:
         raise InputError("photographs need --board SPEC, such as --board checkerboard:18x23:50mm")
-    with detection_progress() as progress:
-        observations = pipeline.detect(images, board, jobs=jobs, progress=progress)
-    say_unused(observations)
-    return observations
+    return detected_aloud(images, board, jobs=jobs)
 
 
 def _is_file(images: list[str]) -> bool:

@@ -59,13 +59,14 @@ def demo(
     from opencsp_calib import pipeline
     from opencsp_calib.comparison import compare
     from opencsp_calib.demo import make_demo
+    from opencsp_calib.detecting import usable_cores
     from opencsp_calib.hdf5_calibration import save_calibration
     from opencsp_calib.judgement import judge
     from opencsp_calib.report import write_report
 
     started = time.perf_counter()
     with progress_bar("Rendering photographs") as advance:
-        world = make_demo(folder, views, jobs=jobs or pipeline.usable_cores(), progress=advance)
+        world = make_demo(folder, views, jobs=jobs or usable_cores(), progress=advance)
     rendered = time.perf_counter()
     with detection_progress() as progress:
         calibration = pipeline.calibrate(world.images, world.board, name="demo", jobs=jobs, progress=progress)

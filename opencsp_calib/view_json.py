@@ -1,0 +1,60 @@
+"""A view as JSON, but for its corners, which are arrays: as camera files and journals keep it."""
+
+from collections.abc import Iterable, Mapping
+from typing import Any, get_args
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.detection import Detection, Problem, RejectedCorner, Status, View
+from opencsp_calib.errors import FileFormatError
+
+__all__ = ["OPTIONAL", "problems_as_json", "problems_from_json", "view_as_json", "view_from_json"]
+
+OPTIONAL = {"covariance": (2, 2), "edge_width_px": (), "contrast": ()}
+"""What a detection may or may not know of its corners, with its shape for one corner."""
+
+
+def view_as_json(view: View) -> dict[str, Any]:
+    """Everything of a view but the arrays of its detection."""
+    rejected = [[corner.id, *corner.pixel, corner.reason] for corner in view.detection.rejected]
+    return {
+        "image": view.image,
+        "sha256": view.sha256,
+        "status": view.status,
+        "problems": problems_as_json(view.problems),
+        "reason": view.detection.reason,
+        "rejected": rejected,
+    }
+
+
+def view_from_json(entry: Mapping[str, Any], arrays: Mapping[str, Floats | None]) -> View:
+    """The view again, with the arrays of its detection: ``ids``, ``pixels`` and those of `OPTIONAL`.
+
+    Raises
+    ------
+    FileFormatError
+        If the status is none.
+    """
+    if entry["status"] not in get_args(Status):
+        raise FileFormatError(f"the view {entry['image']!r} has the unknown status {entry['status']!r}")
+    rejected = tuple(RejectedCorner(int(i), (float(x), float(y)), str(why)) for i, x, y, why in entry["rejected"])
+    detection = Detection(
+        np.asarray(arrays["ids"]).astype(np.int64),
+        np.asarray(arrays["pixels"]),
+        **{name: arrays[name] for name in OPTIONAL},
+        rejected=rejected,
+        reason=str(entry["reason"]),
+    )
+    problems = problems_from_json(entry["problems"])
+    return View(str(entry["image"]), detection, entry["status"], problems, str(entry["sha256"]))
+
+
+def problems_as_json(problems: Iterable[Problem]) -> list[list[str]]:
+    """Codes and messages."""
+    return [[problem.code, problem.message] for problem in problems]
+
+
+def problems_from_json(entries: list[list[str]]) -> tuple[Problem, ...]:
+    """The problems again."""
+    return tuple(Problem(str(code), str(message)) for code, message in entries)
