@@ -27,12 +27,14 @@ if TYPE_CHECKING:
 
 __all__ = [
     "EXTENSIONS",
+    "MAX_BYTES",
     "EncodedImage",
     "ImageFile",
     "decode_image",
     "encode_thumbnail",
     "find_images",
     "images_in",
+    "natural_order",
     "read_encoded",
     "read_image",
     "undistort",
@@ -111,7 +113,7 @@ def _expanded(text: str) -> list[Path]:
     if path.exists():
         return [path]
     if glob.has_magic(text):
-        found = sorted((Path(p) for p in glob.glob(text) if Path(p).is_file()), key=_natural)
+        found = sorted((Path(p) for p in glob.glob(text) if Path(p).is_file()), key=natural_order)
         if not found:
             raise InputError(f"no file matches {text}")
         return found
@@ -121,10 +123,10 @@ def _expanded(text: str) -> list[Path]:
 def images_in(folder: Path) -> list[Path]:
     """The image files of a folder by extension, sorted naturally; not hidden ones, such as files being written."""
     files = (path for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS and not path.name.startswith("."))
-    return sorted((path for path in files if path.is_file()), key=_natural)
+    return sorted((path for path in files if path.is_file()), key=natural_order)
 
 
-def _natural(path: Path) -> list[tuple[int, str]]:
+def natural_order(path: Path) -> list[tuple[int, str]]:
     """Sorts image2 before image10."""
     parts = re.split(r"([0-9]+)", path.as_posix())
     return [(int(part), "") if part.isdecimal() else (-1, part.lower()) for part in parts]

@@ -19,7 +19,7 @@ from opencsp_calib.errors import InputError
 from opencsp_calib.models import LensModel, lens_model
 from opencsp_calib.pose import Pose
 
-__all__ = ["initial_camera", "initial_poses"]
+__all__ = ["initial_camera", "initial_poses", "rough_tilts"]
 
 FOCAL_LENGTHS = np.geomspace(0.15, 30.0, 20)  # in image sides
 REFINEMENTS = 6  # each halves the step between focal lengths, of 32 %
@@ -74,6 +74,17 @@ def initial_poses(camera: Camera, observations: Observations) -> tuple[Pose, ...
     search = _PoseSearch(observations.board.points, observations.detections, CORNERS)
     rotations, translations = search.poses(camera.lens, camera.params)
     return tuple(Pose.from_matrix(r, t) for r, t in zip(rotations, translations, strict=True))
+
+
+def rough_tilts(observations: Observations) -> dict[str, float]:
+    """By how many degrees the board is tilted in each used view, by the image's name, before there is a camera.
+
+    Empty where there are no used views: one that is tilted tells the focal length roughly, several tell it better.
+    """
+    if not observations.used:
+        return {}
+    poses = initial_poses(initial_camera(observations, "pinhole"), observations)
+    return {view.image: pose.tilt_deg for view, pose in zip(observations.used, poses, strict=True)}
 
 
 def _adapted(guess: Camera, image_size: tuple[int, int], lens: LensModel) -> Params:

@@ -1,16 +1,32 @@
 """How to solve: everything a solver can be asked for."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, cast
 
 from opencsp_calib.camera import Camera
 from opencsp_calib.errors import InputError
 
-__all__ = ["BoardShape", "SolveOptions", "Weights"]
+__all__ = ["PRESETS", "BoardShape", "PixelAspect", "SolveOptions", "Weights", "aspect_from"]
 
 BoardShape: TypeAlias = Literal["flat", "warp", "free"]
 Weights: TypeAlias = Literal["equal", "covariance"]
+PixelAspect: TypeAlias = Literal["free", "square"] | float
+
+PRESETS: Mapping[str, Mapping[str, Any]] = {
+    "opencsp": {
+        "detector": "opencsp",
+        "refine": "none",
+        "solver": "opencv",
+        "model": "opencv4",
+        "board_shape": "flat",
+        "pixel_aspect": "free",
+        "weights": "equal",
+        "robust": False,
+    }
+}
+"""Options of `pipeline.detect` and `pipeline.solve` that belong together; ``opencsp`` is what OpenCSP itself does."""
 
 
 @dataclass(frozen=True)
@@ -53,3 +69,19 @@ class SolveOptions:
             "robust": self.robust,
         }
         return frozenset(ability for ability, is_needed in needed.items() if is_needed)
+
+
+def aspect_from(text: str | None) -> PixelAspect | None:
+    """What a person typed for the pixel aspect: free, square, or a number (fy/fx).
+
+    Raises
+    ------
+    InputError
+        If it is none of them.
+    """
+    if text is None or text in ("free", "square"):
+        return cast("PixelAspect | None", text)
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"the pixel aspect is free, square or a number (fy/fx), not {text!r}") from None

@@ -26,7 +26,7 @@ from opencsp_calib.interfaces import Solver
 from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Refine, Search
 from opencsp_calib.models import lens_model
-from opencsp_calib.options import BoardShape, SolveOptions, Weights
+from opencsp_calib.options import BoardShape, PixelAspect, SolveOptions, Weights
 from opencsp_calib.registry import installed
 from opencsp_calib.uncertainty import with_uncertainty
 
@@ -38,7 +38,6 @@ MIN_VIEWS = 3
 OF_DETECT = ("detector", "refine", "jobs", "progress", "stop", "journal", "scheduler")
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
-PixelAspect: TypeAlias = Literal["free", "square"] | float
 
 
 def board_from(text: str) -> Board:

@@ -39,6 +39,11 @@ class Pose:
         # a copy, because SciPy asks for a writable buffer
         return np.asarray(Rotation.from_rotvec(self.rotation.copy()).as_matrix(), dtype=np.float64)
 
+    @property
+    def tilt_deg(self) -> float:
+        """Between the board's normal and the optical axis: 0 is head-on."""
+        return float(np.degrees(np.arccos(min(1.0, abs(self.matrix[2, 2])))))
+
     def transform(self, points: Points) -> Points:
         """(N, 3) m board points in the camera's frame."""
         return np.asarray(points @ self.matrix.T + self.translation, dtype=np.float64)

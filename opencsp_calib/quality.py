@@ -94,7 +94,7 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
                 image=view.image,
                 corners=int((~outliers).sum()),
                 rms_px=float(rms),
-                tilt_deg=float(np.degrees(np.arccos(min(1.0, abs(matrix[2, 2]))))),
+                tilt_deg=pose.tilt_deg,
                 roll_deg=float(np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0]))),
                 orientation="horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical",
                 range_m=float(np.linalg.norm(pose.transform(board_middle[None])[0])),

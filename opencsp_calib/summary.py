@@ -7,6 +7,7 @@ from typing import Any
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations, Problem, View
+from opencsp_calib.errors import InputError
 from opencsp_calib.judgement import judge
 from opencsp_calib.quality import ViewQuality, view_qualities
 
@@ -14,13 +15,32 @@ __all__ = [
     "PIXEL_PITCH",
     "calibration_as_json",
     "camera_as_json",
+    "notes_from",
     "observations_as_json",
     "parameter_lines",
     "problems_as_json",
+    "view_as_json",
 ]
 
 PIXEL_PITCH = "pixel_pitch_um"
 """The key in a camera's record that tells the size of its pixels in micrometres."""
+
+
+def notes_from(pairs: Iterable[str]) -> dict[str, str]:
+    """A camera's record from what a person typed: KEY=VALUE each.
+
+    Raises
+    ------
+    InputError
+        If one is not.
+    """
+    notes = {}
+    for pair in pairs:
+        key, equals, value = pair.partition("=")
+        if not (equals and key.strip()):
+            raise InputError(f"a note is written as KEY=VALUE, such as aperture=f/8, not {pair!r}")
+        notes[key.strip()] = value.strip()
+    return notes
 
 
 def camera_as_json(camera: Camera, sigma: Iterable[float] | None = None) -> dict[str, Any]:
@@ -47,7 +67,7 @@ def calibration_as_json(calibration: Calibration, seconds: Mapping[str, float], 
         "rejected_corners": calibration.rejected_corners,
         "board_shape": calibration.options.board_shape,
         "pixel_aspect": "free" if aspect is None else "square" if aspect == 1.0 else aspect,
-        "views": [_view_as_json(view, qualities.get(view.image)) for view in calibration.observations.views],
+        "views": [view_as_json(view, qualities.get(view.image)) for view in calibration.observations.views],
         "warnings": problems_as_json(judge(calibration)),
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
         "output": output,
@@ -61,7 +81,7 @@ def observations_as_json(
     return {
         "board": observations.board.spec,
         "image_size": list(observations.image_size),
-        "views": [_view_as_json(view, None) for view in observations.views],
+        "views": [view_as_json(view) for view in observations.views],
         "seconds": {key: round(value, 3) for key, value in seconds.items()},
         "output": output,
     }
@@ -104,7 +124,8 @@ def _in_millimetres(camera: Camera, record: Mapping[str, str]) -> list[tuple[str
     return [(name, f"{value:.4f} mm", "") for name, value in values.items()]
 
 
-def _view_as_json(view: View, quality: ViewQuality | None) -> dict[str, Any]:
+def view_as_json(view: View, quality: ViewQuality | None = None) -> dict[str, Any]:
+    """One of the ``views`` of the command line's JSON; what is known only once it is calibrated is null."""
     widths = view.detection.edge_width_px
     median = math.nan if widths is None or not len(widths) else float(sorted(widths)[len(widths) // 2])
     return {

@@ -197,5 +197,4 @@ def _place(calibration: Calibration, image: str) -> str:
     index = [view.image for view in calibration.observations.used].index(image)
     pose = calibration.cam_from_board[index]
     distance = np.linalg.norm(pose.transform(calibration.board.points.mean(axis=0)[None])[0])
-    tilt = np.degrees(np.arccos(min(1.0, abs(pose.matrix[2, 2]))))
-    return f"with the board {distance:.2f} m away and tilted by {tilt:.0f} degrees"
+    return f"with the board {distance:.2f} m away and tilted by {pose.tilt_deg:.0f} degrees"

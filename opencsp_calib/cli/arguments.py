@@ -1,15 +1,12 @@
 """The arguments that several commands share."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, cast
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from opencsp_calib.errors import InputError
-
 if TYPE_CHECKING:
     from opencsp_calib.camera import Camera
-    from opencsp_calib.pipeline import PixelAspect
 
 SOLVING = "Solving"
 OUTPUT = "Output"
@@ -93,32 +90,11 @@ GuessOption = Annotated[
 ]
 
 
-def aspect_from(text: str | None) -> "PixelAspect | None":
-    """What ``--pixel-aspect`` says."""
-    if text is None or text in ("free", "square"):
-        return cast("PixelAspect | None", text)
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"--pixel-aspect takes free, square or a number (fy/fx), not {text!r}") from None
-
-
 def guess_from(path: Path | None) -> "Camera | None":
     """The camera that ``--guess`` names, in any format we read."""
     from opencsp_calib.cli.cameras import camera_in
 
     return None if path is None else camera_in(path)
-
-
-def notes_from(pairs: list[str]) -> dict[str, str]:
-    """What ``--note KEY=VALUE`` says."""
-    notes = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not (equals and key.strip()):
-            raise InputError(f"--note takes KEY=VALUE, such as --note aperture=f/8, not {pair!r}")
-        notes[key.strip()] = value.strip()
-    return notes
 
 
 def given(**options: Any) -> dict[str, Any]:

@@ -16,18 +16,6 @@ if TYPE_CHECKING:
     from opencsp_calib.detection import Observations
     from opencsp_calib.images import ImageFile
 
-PRESET_OPENCSP = {
-    "detector": "opencsp",
-    "refine": "none",
-    "solver": "opencv",
-    "model": "opencv4",
-    "board_shape": "flat",
-    "pixel_aspect": "free",
-    "weights": "equal",
-    "robust": False,
-}
-"""Exactly what OpenCSP's own calibration does."""
-
 
 def calibrate(
     images: args.Images,
@@ -67,6 +55,7 @@ def calibrate(
     """Calibrate a camera from photographs of a board."""
     from opencsp_calib import dropping, pipeline
     from opencsp_calib.images import find_images
+    from opencsp_calib.options import aspect_from
 
     _check_targets(output, report)
     options = _preset(
@@ -76,7 +65,7 @@ def calibrate(
         model=model,
         solver=solver,
         board_shape=board_shape,
-        pixel_aspect=args.aspect_from(pixel_aspect),
+        pixel_aspect=aspect_from(pixel_aspect),
         weights=weights,
         robust=robust,
     )
@@ -158,6 +147,7 @@ def solve(
     """Solve again from what `detect` or `calibrate` kept; a camera file repeats its own run unless told otherwise."""
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
+    from opencsp_calib.options import aspect_from
 
     _check_targets(output, report)
     observations = load_observations(file)
@@ -165,7 +155,7 @@ def solve(
         model=model,
         solver=solver,
         board_shape=board_shape,
-        pixel_aspect=args.aspect_from(pixel_aspect),
+        pixel_aspect=aspect_from(pixel_aspect),
         weights=weights,
         robust=robust,
         guess=args.guess_from(guess),
@@ -199,22 +189,23 @@ def _as_before(file: Path) -> dict[str, Any]:
 
 
 def _preset(preset: str | None, **options: Any) -> dict[str, Any]:
+    from opencsp_calib.options import PRESETS
+
     asked = args.given(**options)
     if preset is None:
         return asked
+    meant = PRESETS[preset]
     for key, value in asked.items():
-        if value != PRESET_OPENCSP[key]:
+        if value != meant[key]:
             flag = "--" + key.replace("_", "-")
-            raise InputError(
-                f"--preset {preset} means {flag} {PRESET_OPENCSP[key]}; leave {flag} {value} or the preset"
-            )
-    return dict(PRESET_OPENCSP)
+            raise InputError(f"--preset {preset} means {flag} {meant[key]}; leave {flag} {value} or the preset")
+    return dict(meant)
 
 
 def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
-    from opencsp_calib.summary import PIXEL_PITCH
+    from opencsp_calib.summary import PIXEL_PITCH, notes_from
 
-    record = args.notes_from(notes)
+    record = notes_from(notes)
     return record | ({PIXEL_PITCH: f"{pixel_pitch:g}"} if pixel_pitch else {})
 
 

@@ -1,0 +1,13 @@
+"""The calibration window, a page in the browser: ``opencsp-calib gui``. A thin face of the same functions as the CLI.
+
+::
+
+    server.py    starts: socket, token, address          guard.py   who may ask at all
+    session.py   what has been chosen and found so far, kept in a folder in DIR
+    work.py      hands long work to jobs.py, which runs in a process of its own
+    files.py     which files may be touched             routes.py  photographs in, thumbnails and results out
+    page.py      the page; each of its sections is a file of its own
+    *.js         the few elements that NiceGUI does not have; style.css, how all of it looks
+
+NiceGUI is imported here and nowhere else (extra ``gui``).
+"""

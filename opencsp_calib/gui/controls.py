@@ -1,0 +1,35 @@
+"""The page's buttons and fields, made alike."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from nicegui import ui
+
+__all__ = ["action", "choice", "field", "quiet_action"]
+
+
+def action(label: str, on_click: Callable[[], Any], testid: str = "") -> ui.button:
+    """A button for a step of the procedure."""
+    button = ui.button(label, on_click=on_click).props("no-caps unelevated").classes("action")
+    return button.props(f"data-testid={testid}") if testid else button
+
+
+def quiet_action(label: str, on_click: Callable[[], Any], testid: str = "") -> ui.button:
+    """A button to look at something, or for what is seldom needed."""
+    return action(label, on_click, testid).props("outline")
+
+
+def field(label: str, value: str, on_change: Callable[[str], Any], testid: str = "", hint: str = "") -> ui.input:
+    """A line to type into; the test id is that of the ``input`` element itself."""
+    made = ui.input(label, value=value, on_change=lambda event: on_change(event.value or ""))
+    made.props("outlined dense autocomplete=off").classes("field")
+    if hint:
+        made.props["placeholder"] = hint
+    return made.props(f"data-testid={testid}") if testid else made
+
+
+def choice(label: str, options: Mapping[str, str], value: str, on_change: Callable[[str], Any]) -> ui.select:
+    """One of several."""
+    known = dict(options) if value in options else {**options, value: value}
+    made = ui.select(known, label=label, value=value, on_change=lambda event: on_change(event.value))
+    return made.props("outlined dense options-dense").classes("field")

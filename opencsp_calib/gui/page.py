@@ -1,0 +1,119 @@
+"""The page: header, the steps on the left in the order of use, what was found on the right, the status below.
+
+How a section is added: write a file with one function ``build(page)`` that makes its elements and returns a function
+without arguments which brings them up to date with ``page.session``; it is called whenever the session changes. Put it
+into `STEPS` (left), `RESULTS` (right, shown one at a time) or `TABS` (a tab of its own beside Calibrate) below. A
+section changes nothing itself: it calls a method of the session, which tells every page.
+"""
+
+from collections.abc import Callable
+from importlib.resources import files
+from typing import TypeAlias
+
+from nicegui import ui
+
+from opencsp_calib.errors import CalibError
+from opencsp_calib.gui import board_fields, calibrating, corners, photographs, saving, status, views
+from opencsp_calib.gui.session import Session
+
+__all__ = ["Page", "show"]
+
+Refresh: TypeAlias = Callable[[], None]
+Build: TypeAlias = Callable[["Page"], Refresh]
+
+STEPS: tuple[tuple[str, Build], ...] = (
+    ("Camera and board", board_fields.build),
+    ("Photographs", photographs.build),
+    ("Corners", corners.build),
+    ("Calibration", calibrating.build),
+    ("Save", saving.build),
+)
+RESULTS: tuple[tuple[str, Build], ...] = (("Photographs", views.build),)
+TABS: tuple[tuple[str, Build], ...] = ()
+
+
+class Page:
+    """What one tab of a browser shows of the session."""
+
+    def __init__(self, session: Session) -> None:
+        self.session = session
+        self.selected: set[str] = set()
+        self._refreshers: dict[str, Refresh] = {}
+        self._always: list[Refresh] = []
+
+    def show_result(self, name: str) -> None:
+        """Bring one of `RESULTS` to the front."""
+        self._results.set_value(name)
+
+    def attempt(self, action: Callable[[], None]) -> None:
+        """Do what a person asked for; what is wrong with it goes into the status."""
+        try:
+            action()
+        except CalibError as error:
+            self.session.say(str(error), "bad")
+
+    def build(self) -> None:
+        """Make all elements."""
+        with ui.element("header").classes("head"):
+            ui.label("Camera calibration").classes("title")
+            ui.label(str(self.session.folder)).classes("quiet path")
+            with ui.tabs().props("no-caps dense inline-label").classes("pages") as tabs:
+                for name, _ in (("Calibrate", None), *TABS):
+                    ui.tab(name)
+            _theme_button()
+        with ui.tab_panels(tabs, value="Calibrate", animated=False).classes("panels body"):
+            with ui.tab_panel("Calibrate").classes("bare"):
+                self._build_calibrate()
+            for name, build in TABS:
+                with ui.tab_panel(name).classes("page"):
+                    self._always.append(build(self))
+        with ui.element("footer").classes("foot"):
+            self._always.append(status.build(self))
+
+    def _build_calibrate(self) -> None:
+        with ui.element("div").classes("columns"):
+            with ui.element("div").classes("steps"):
+                for number, (title, build) in enumerate(STEPS, start=1):
+                    with ui.element("section").classes("step"):
+                        ui.html(f"<h2><span>{number}</span>{title}</h2>", sanitize=False)
+                        self._always.append(build(self))
+            with ui.element("main").classes("results"):
+                with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
+                    for name, _ in RESULTS:
+                        ui.tab(name)
+                with ui.tab_panels(self._results, value=RESULTS[0][0], animated=False).classes("panels"):
+                    for name, build in RESULTS:
+                        with ui.tab_panel(name).classes("bare"):
+                            self._refreshers[name] = build(self)
+                self._results.on_value_change(self.refresh)
+
+    def refresh(self) -> None:
+        """Bring what can be seen up to date."""
+        for refresh in self._always:
+            refresh()
+        self._refreshers[str(self._results.value)]()
+
+
+def show(session: Session) -> None:
+    """Build the page for one more tab of a browser."""
+    ui.colors(primary="#0b6e99", positive="#1c7c4a", negative="#b3261e", warning="#9a6200")
+    style = files("opencsp_calib.gui").joinpath("style.css").read_text(encoding="utf-8")
+    ui.add_css(style)
+    ui.add_body_html("<script>history.replaceState(null, '', location.pathname + location.hash)</script>")
+    page = Page(session)
+    page.build()
+    page.refresh()
+    session.changed.subscribe(page.refresh)
+
+
+def _theme_button() -> None:
+    dark = ui.dark_mode(None)
+    following = {None: True, True: False, False: None}
+    icons = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
+    names = {None: "as the system", True: "dark", False: "light"}
+
+    def turn() -> None:
+        dark.value = following[dark.value]
+        button.props(f'icon={icons[dark.value]} aria-label="Colours: {names[dark.value]}"')
+
+    button = ui.button(on_click=turn).props('flat round dense icon=brightness_auto aria-label="Colours: as the system"')

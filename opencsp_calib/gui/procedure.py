@@ -1,0 +1,76 @@
+"""The two long steps of the procedure: finding the corners, and calibrating, with all images or without some."""
+
+from collections.abc import Iterable
+from functools import partial
+
+from opencsp_calib.gui.files import within
+from opencsp_calib.gui.news import Message
+from opencsp_calib.gui.session import Session
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations
+
+__all__ = ["calibrate", "find_corners", "put_back", "remove"]
+
+
+def find_corners(session: Session) -> None:
+    """Look for the board in all photographs."""
+    session.start("Finding corners", partial(_find_corners, session), len(session.selection.files))
+
+
+def calibrate(session: Session) -> None:
+    """Solve for the camera from all views that are not removed."""
+    session.start("Calibrating", partial(_calibrate, session))
+
+
+def remove(session: Session, names: Iterable[str]) -> None:
+    """Leave images out, and calibrate again."""
+    session.removed |= set(names)
+    calibrate(session)
+
+
+def put_back(session: Session, names: Iterable[str]) -> None:
+    """Take images in again, and calibrate again."""
+    session.removed -= set(names)
+    calibrate(session)
+
+
+async def _find_corners(session: Session) -> None:
+    asked, target = session.asked(), session.file("observations")
+    session.views = {}
+    try:
+        await session.job(
+            "find_corners",
+            images=[str(file.path) for file in session.selection.files],
+            board=session.settings.spec,
+            options=session.settings.finding,
+            observations=str(target),
+        )
+        found = load_observations(target)
+        session.observations, session.found_with = found, asked
+    finally:
+        session.describe_views()
+    session.removed &= {view.image for view in found.views}
+    text = f"The board is found in {len(found.used)} of {len(found.views)} photographs."
+    session.message = Message(text, "good" if found.used else "bad")
+
+
+async def _calibrate(session: Session) -> None:
+    settings, target, new = session.settings, session.file("calibration"), session.file("new")
+    options = {
+        "name": settings.camera_name.strip() or "camera",
+        "record": settings.record,
+        "provenance": session.selection.provenance(),
+    }
+    await session.job(
+        "solve",
+        observations=str(session.file("observations")),
+        exclude=sorted(session.removed),
+        options=settings.solving | options,
+        guess=settings.guess and str(within(session.folder, settings.guess)),
+        calibration=str(new),
+    )
+    if target.exists():
+        target.replace(session.file("before"))
+    new.replace(target)
+    session.before, session.calibration = session.calibration, load_calibration(target)
+    used = len(session.calibration.observations.used)
+    session.message = Message(f"Calibrated from {used} views: rms {session.calibration.rms_px:.4f} px.", "good")

@@ -1,0 +1,261 @@
+"""What has been chosen and found so far: one for the window, whatever pages show it, kept in a folder below DIR.
+
+::
+
+    DIR/opencsp-calib-session/
+        session.json         settings, where the photographs are, what was left out
+        photographs/         those that came by upload
+        thumbnails/
+        observations.hdf5    of the last search for corners     (our own files, see `hdf5_calibration`; named so that
+        calibration.hdf5     of the last calibration            they are not taken for camera files of the user's)
+        before.hdf5          of the one before
+
+Every page shows the same session and is told when it changes, so that a reload, a second tab or a lost connection lose
+nothing; nor does a restart, because all of it is on the disk.
+"""
+
+import asyncio
+import json
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from nicegui import Event
+
+from opencsp_calib.atomic import replacing
+from opencsp_calib.calibration import Calibration
+from opencsp_calib.detection import Observations
+from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.gui.files import shown
+from opencsp_calib.gui.news import Level, Message, Progress
+from opencsp_calib.gui.selection import Selection
+from opencsp_calib.gui.settings import Settings
+from opencsp_calib.gui.work import Worker
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_calibration
+from opencsp_calib.initial import rough_tilts
+from opencsp_calib.summary import observations_as_json
+
+__all__ = ["FOLDER", "Session"]
+
+FOLDER = "opencsp-calib-session"
+VERSION = 1
+PAUSE_S = 0.2  # between two news to the pages while work goes on
+
+
+class Session:
+    """The state of the window, and what can be done next.
+
+    Parameters
+    ----------
+    folder : Path
+        Below which all files are.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder.resolve()
+        self.own = self.folder / FOLDER
+        self.changed: Event[[]] = Event()
+        self.worker = Worker()
+        self.settings = Settings()
+        self.selection = Selection(self.folder, self.own / "photographs")
+        self.views: dict[str, dict[str, Any]] = {}  # by image, as `summary.view_as_json`
+        self.found_with: list[Any] = []
+        self.observations: Observations | None = None
+        self.removed: frozenset[str] = frozenset()
+        self.calibration: Calibration | None = None
+        self.before: Calibration | None = None
+        self.progress: Progress | None = None
+        self.message = Message("Describe the board and select photographs.")
+        self._news: asyncio.TimerHandle | None = None
+        self._writing: asyncio.TimerHandle | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._load()
+
+    # --- what makes sense now ---
+
+    @property
+    def busy(self) -> bool:
+        """Whether work goes on."""
+        return self.progress is not None
+
+    @property
+    def can_find(self) -> bool:
+        """Whether there is something to look for, and photographs to look at."""
+        chosen = self.selection
+        return bool(chosen.files) and not chosen.receiving and not self.busy and self.settings.is_complete
+
+    @property
+    def is_found(self) -> bool:
+        """Whether what was found is what the settings and photographs of now would give."""
+        return self.observations is not None and self.found_with == self.asked()
+
+    @property
+    def can_calibrate(self) -> bool:
+        """Whether corners are found."""
+        return self.is_found and not self.busy and any(v["status"] == "used" for v in self.views.values())
+
+    # --- what a person does ---
+
+    def choose(self, **values: Any) -> None:
+        """Change settings."""
+        self.settings = replace(self.settings, **values)
+        self.tell()
+
+    def say(self, text: str, level: Level = "info") -> None:
+        """Put a line in the status."""
+        self.message = Message(text, level)
+        self.tell()
+
+    def forget_photographs(self) -> None:
+        """Start again with none, and with no results."""
+        self.views, self.removed, self.found_with = {}, frozenset(), []
+        self.observations = self.calibration = self.before = None
+        for name in ("observations", "calibration", "before"):
+            self.file(name).unlink(missing_ok=True)
+        self.selection.clear()
+        self.say("Select photographs.")
+
+    def end_batch(self, batch: str) -> None:
+        """No more photographs of this batch of uploads will come."""
+        if self.selection.end(batch):
+            self.say(f"{len(self.selection.files)} photographs selected.")
+
+    def save_camera(self, target: Path) -> None:
+        """Write the camera file.
+
+        Raises
+        ------
+        InputError
+            If there is no calibration, or it cannot be written.
+        """
+        if self.calibration is None:
+            raise InputError("calibrate first")
+        if target in {file.path.resolve() for file in self.selection.files}:
+            raise InputError(f"{target.name} is one of the photographs; give another name")
+        save_calibration(self.calibration, target)
+        self.say(f"Camera saved: {shown(self.folder, target)}", "good")
+
+    def cancel(self) -> None:
+        """Stop the work that goes on."""
+        self.worker.stop()
+
+    # --- telling and keeping ---
+
+    def tell(self) -> None:
+        """Tell all pages, and keep it all soon."""
+        self.changed.emit()
+        if self._writing is None:
+            self._writing = asyncio.get_running_loop().call_later(1.0, self.keep)
+
+    def tell_soon(self) -> None:
+        """Tell all pages, but not more often than they can follow."""
+        if self._news is None:
+            self._news = asyncio.get_running_loop().call_later(PAUSE_S, self._tell_now)
+
+    def keep(self) -> None:
+        """Write the session file."""
+        self._writing = None
+        content = {
+            "version": VERSION,
+            "settings": self.settings.as_json(),
+            "sources": self.selection.sources,
+            "found_with": self.found_with,
+            "removed": sorted(self.removed),
+        }
+        try:
+            with replacing(self.file("session", "json")) as temporary:
+                temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        except (InputError, OSError) as error:
+            self.message = Message(f"This session cannot be kept: {error}", "bad")
+            self.changed.emit()
+
+    def close(self) -> None:
+        """Keep all, and end the work."""
+        self.keep()
+        self.worker.stop()
+
+    def _tell_now(self) -> None:
+        self._news = None
+        self.changed.emit()
+
+    # --- the work ---
+
+    def start(self, what: str, work: Callable[[], Coroutine[Any, Any, None]], total: int = 0) -> None:
+        """Begin long work, unless some goes on; what goes wrong with it is said in the status."""
+        if self.busy:
+            return
+        self.progress = Progress(what, total=total)
+        self._task = asyncio.get_running_loop().create_task(self._run(work))
+        self.tell()
+
+    async def job(self, name: str, **arguments: Any) -> Any:
+        """Have a job of `jobs.py` done, showing its progress; gives what came of it. To be called by work."""
+        result = None
+        async for answer in self.worker.run(name, arguments):
+            if "view" in answer:
+                self.views[answer["view"]["image"]] = answer["view"]
+            if "total" in answer and self.progress:
+                self.progress = replace(self.progress, done=answer["done_images"], total=answer["total"])
+                self.tell_soon()
+            result = answer.get("done")
+        return result
+
+    async def _run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+        try:
+            await work()
+        except (CalibError, OSError) as error:
+            self.message = Message(str(error), "bad")
+        except Exception as error:  # a defect of ours: said, and the window lives on
+            self.message = Message(f"unexpected: {error!r}", "bad")
+            raise
+        finally:
+            self.progress = None
+            self.tell()
+            await self.worker.start()  # ready again, if it was stopped
+
+    def asked(self) -> list[Any]:
+        """What decides what is found."""
+        return [self.settings.spec, self.settings.finding, [str(file.path) for file in self.selection.files]]
+
+    def describe_views(self) -> None:
+        """Tell of each view what is known of it: of the last search that ended."""
+        seen = self.observations
+        tilts = rough_tilts(seen) if seen else {}
+        found: list[Mapping[str, Any]] = observations_as_json(seen, {}, None)["views"] if seen else []
+        self.views = {view["image"]: {**view, "tilt_deg": tilts.get(view["image"])} for view in found}
+
+    # --- the disk ---
+
+    def file(self, name: str, extension: str = "hdf5") -> Path:
+        """One of the session's own files."""
+        self.own.mkdir(exist_ok=True)
+        return self.own / f"{name}.{extension}"
+
+    def _load(self) -> None:
+        """Go on from where it was left."""
+        path = self.own / "session.json"
+        if not path.is_file():
+            return
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+            self.settings = Settings.from_json(content["settings"])
+            self.selection.sources = tuple(str(source) for source in content["sources"])
+            self.found_with = content["found_with"]
+            self.removed = frozenset(str(name) for name in content["removed"])
+            wrong = self.selection.look_up()
+            with suppress(FileNotFoundError):
+                self._load_results()
+            self.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
+        except (InputError, OSError, ValueError, KeyError, TypeError) as error:
+            self.message = Message(f"The session kept in {shown(self.folder, path)} cannot be read: {error}", "bad")
+
+    def _load_results(self) -> None:
+        if self.file("observations").exists():
+            self.observations = load_observations(self.file("observations"))
+            self.describe_views()
+        if self.file("calibration").exists():
+            self.calibration = load_calibration(self.file("calibration"))
+        if self.file("before").exists():
+            self.before = load_calibration(self.file("before"))

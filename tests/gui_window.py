@@ -1,0 +1,111 @@
+"""Driving the calibration window as a person does: by the words on it, and by its test ids."""
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+PATIENCE_S = 120
+SCREENSHOTS = os.environ.get("OPENCSP_CALIB_SCREENSHOTS")
+"""A folder to put a picture of every step into."""
+
+
+class Server:
+    """``opencsp-calib gui`` in a process of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def __enter__(self) -> "Server":
+        command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.address = self.process.stdout.readline().strip()
+        match = re.fullmatch(r"http://127\.0\.0\.1:([0-9]+)/\?token=([\w-]{20,})", self.address)
+        assert match, self.process.communicate()
+        self.root = f"http://127.0.0.1:{match[1]}/"
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.terminate()
+        self.more_output, self.errors = self.process.communicate(timeout=30)
+
+
+class Window:
+    """The page in a browser."""
+
+    def __init__(self, browser: Any, server: Server) -> None:
+        self.browser, self.server = browser, server
+
+    def open(self) -> None:
+        self.browser.get(self.server.address)
+        self.until(lambda: self.element("status").text)
+
+    def element(self, testid: str) -> Any:
+        return self.browser.find_element("css selector", f"[data-testid={testid}]")
+
+    def until(self, true: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
+        """Wait until it is true; elements that are made anew meanwhile do not matter."""
+        from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+
+        end = time.monotonic() + patience_s
+        while True:
+            try:
+                if found := true():
+                    return found
+            except (StaleElementReferenceException, NoSuchElementException):
+                found = None
+            if time.monotonic() > end:
+                self.picture("gave-up")
+                raise AssertionError(f"not within {patience_s} s; status: {self.status}")
+            time.sleep(0.05)
+
+    def type(self, testid: str, text: str) -> None:
+        field = self.element(testid)
+        field.clear()
+        field.send_keys(text)
+
+    def click(self, testid: str) -> None:
+        self.until(lambda: self.element(testid).is_enabled())
+        self.element(testid).click()
+
+    def press(self, words: str) -> None:
+        """Click the button with these words on it."""
+        button = f"//button[normalize-space()='{words}']"
+        self.until(lambda: self.browser.find_element("xpath", button).is_enabled())
+        self.browser.find_element("xpath", button).click()
+
+    def enabled(self, testid: str) -> bool:
+        return bool(self.element(testid).is_enabled())
+
+    @property
+    def status(self) -> str:
+        return str(self.element("status").text)
+
+    @property
+    def rms(self) -> str:
+        return str(self.element("rms").text)
+
+    def select(self, paths: list[Path]) -> None:
+        self.browser.find_element("css selector", "input[type=file]").send_keys("\n".join(map(str, paths)))
+
+    def describe(self, name: str, columns: int, rows: int, square_mm: float) -> None:
+        for testid, value in (("camera-name", name), ("grid-x", columns), ("grid-y", rows), ("square-size", square_mm)):
+            self.type(testid, str(value))
+
+    def find_corners(self) -> None:
+        self.click("find-corners")
+        self.until(lambda: self.status.startswith("The board is found"))
+
+    def calibrate(self) -> float:
+        self.click("calibrate")
+        self.until(lambda: self.status.startswith("Calibrated"))
+        return float(self.rms.split()[0])
+
+    def picture(self, name: str) -> None:
+        if SCREENSHOTS:
+            Path(SCREENSHOTS).mkdir(parents=True, exist_ok=True)
+            self.browser.save_screenshot(str(Path(SCREENSHOTS) / f"{name}.png"))
