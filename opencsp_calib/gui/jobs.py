@@ -60,21 +60,24 @@ def _tell(answers: TextIO, answer: dict[str, Any]) -> None:
 
 
 def find_corners(
-    tell: Tell, images: list[str], board: str, options: Mapping[str, Any], observations: str
-) -> dict[str, Any]:
-    """Look for the board in photographs; tells each view as it is done, and writes a file of observations."""
+    tell: Tell, images: list[str], board: str, options: Mapping[str, Any], observations: str, journal: str
+) -> None:
+    """Look for the board in photographs; tells each view as it is done, and writes a file of observations.
+
+    What the journal knows is not looked for again: a search that was cancelled goes on, and one of a few photographs
+    more looks at those only.
+    """
     from opencsp_calib import pipeline
     from opencsp_calib.detection import View
     from opencsp_calib.hdf5_calibration import save_observations
-    from opencsp_calib.initial import rough_tilts
-    from opencsp_calib.summary import observations_as_json, view_as_json
+    from opencsp_calib.journal import Journal
+    from opencsp_calib.summary import view_as_json
 
     def progress(done: int, total: int, view: View) -> None:
         tell({"done_images": done, "total": total, "view": view_as_json(view)})
 
-    found = pipeline.detect(images, pipeline.board_from(board), progress=progress, **options)
+    found = pipeline.detect(images, pipeline.board_from(board), progress=progress, journal=Journal(journal), **options)
     save_observations(found, observations)
-    return observations_as_json(found, {}, None) | {"tilts": rough_tilts(found)}
 
 
 def solve(

@@ -43,6 +43,7 @@ async def _find_corners(session: Session) -> None:
             board=session.settings.spec,
             options=session.settings.finding,
             observations=str(target),
+            journal=str(session.file("found", "journal")),
         )
         found = load_observations(target)
         session.observations, session.found_with = found, asked

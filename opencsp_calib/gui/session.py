@@ -9,6 +9,7 @@
         observations.hdf5    of the last search for corners     (our own files, see `hdf5_calibration`; named so that
         calibration.hdf5     of the last calibration            they are not taken for camera files of the user's)
         before.hdf5          of the one before
+        found.journal        what was found in each photograph, so that a search goes on where it was stopped
 
 Every page shows the same session and is told when it changes, so that a reload, a second tab or a lost connection lose
 nothing; nor does a restart, because all of it is on the disk.
@@ -112,8 +113,8 @@ class Session:
         """Start again with none, and with no results."""
         self.views, self.removed, self.found_with = {}, frozenset(), []
         self.observations = self.calibration = self.before = None
-        for name in ("observations", "calibration", "before"):
-            self.file(name).unlink(missing_ok=True)
+        for name in ("observations.hdf5", "calibration.hdf5", "before.hdf5", "found.journal"):
+            (self.own / name).unlink(missing_ok=True)
         self.selection.clear()
         self.say("Select photographs.")
 
