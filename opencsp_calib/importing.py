@@ -27,6 +27,7 @@ from opencsp_calib.models import LENS_MODELS
 __all__ = ["as_imported", "exact", "fitted", "not_exactly", "pick", "read_cameras", "recognise"]
 
 NO_SIZE = "the file does not have the image size; add --image-size WIDTHxHEIGHT"
+MAX_LISTED = 20  # cameras in a message
 ACCEPTED_PX = 0.1  # worst error of a fit that nobody need be asked about
 
 
@@ -183,7 +184,8 @@ def pick(cameras: Mapping[str, Imported], name: str | None = None) -> tuple[str,
     InputError
         If there is none of that name, or none was named and there are several; the message lists them.
     """
-    listed = ", ".join(list(cameras)[:20]) + (f" ... ({len(cameras)} in all)" if len(cameras) > 20 else "")
+    listed = ", ".join(_quoted(key) for key in list(cameras)[:MAX_LISTED])
+    listed += f" ... ({len(cameras)} in all)" if len(cameras) > MAX_LISTED else ""
     if name is not None:
         if name not in cameras:
             raise InputError(f"no camera is called {name!r} in this file; it has {listed}")
@@ -193,6 +195,11 @@ def pick(cameras: Mapping[str, Imported], name: str | None = None) -> tuple[str,
         why = "; ".join(["", *notes])
         raise InputError(f"the file has {len(cameras)} cameras; choose one with --camera: {listed}{why}")
     return next(iter(cameras.items()))
+
+
+def _quoted(name: str) -> str:
+    """A camera's name for a list: in quotes where one could not tell where it ends."""
+    return f'"{name}"' if "," in name or name.strip() != name else name
 
 
 def exact(imported: Imported) -> Camera:
@@ -209,7 +216,8 @@ def exact(imported: Imported) -> Camera:
         reason = f"not exactly one of our lens models: {'; '.join(imported.obstacles)}"
         if imported.project is None and imported.resize is None:
             raise NotExactError(f"{reason}; and it cannot be fitted")
-        raise NotExactError(f"{reason}; --fit MODEL approximates it and states the error ({', '.join(LENS_MODELS)})")
+        models = ", ".join(LENS_MODELS)
+        raise NotExactError(f"{reason}; --fit MODEL of convert approximates it and states the error ({models})")
     if imported.camera is None:
         raise InputError(NO_SIZE)
     return imported.camera

@@ -22,6 +22,7 @@ __all__ = [
     "Drawing",
     "ImageSource",
     "Imported",
+    "KeepsNotes",
     "Provided",
     "Rectangle",
     "Solver",
@@ -161,6 +162,14 @@ class CameraFormat(Provided, Protocol):
 
     def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
         """Write cameras; raises InputError where the format cannot carry one exactly."""
+
+
+@runtime_checkable
+class KeepsNotes(Protocol):
+    """A `CameraFormat` whose files have room for a few lines beside a camera: how it was imported, how well it fits."""
+
+    def write_with_notes(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> None:
+        """Like `CameraFormat.write`, with notes for people by their subject."""
 
 
 @runtime_checkable

@@ -44,6 +44,10 @@ class LensFit:
     worst_px: float
     coverage: float
 
+    def __str__(self) -> str:
+        share = np.floor(1000.0 * self.coverage) / 10.0  # 100 only where it is all of it
+        return f"rms {self.rms_px:.3g} px, worst {self.worst_px:.3g} px over {share:g} % of the image"
+
 
 def fit(
     project: Callable[[Points], Pixels],

@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from opencsp_calib.errors import FileFormatError, InputError, MissingDependencyError
+
 if TYPE_CHECKING:
     from opencsp_calib.camera import Camera
 
@@ -94,7 +96,14 @@ def guess_from(path: Path | None) -> "Camera | None":
     """The camera that ``--guess`` names, in any format we read."""
     from opencsp_calib.cli.cameras import camera_in
 
-    return None if path is None else camera_in(path)
+    if path is None:
+        return None
+    try:
+        return camera_in(path)
+    except (FileFormatError, MissingDependencyError):
+        raise
+    except InputError as error:
+        raise InputError(f"--guess {path}: {error} (with `opencsp-calib convert`, and guess with its output)") from None
 
 
 def given(**options: Any) -> dict[str, Any]:

@@ -11,7 +11,9 @@ from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
     from opencsp_calib.camera import Camera
+    from opencsp_calib.detection import Problem
     from opencsp_calib.interfaces import Imported
+    from opencsp_calib.lens_fit import LensFit
 
 CameraFile = Annotated[Path, typer.Argument(metavar="CAMERA", help="A camera file of any format we read.")]
 CameraName = Annotated[
@@ -61,6 +63,11 @@ def show(
 def compare(
     a: CameraFile,
     b: CameraFile,
+    camera: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME", help="Which camera of a file that has several; given twice, of A and of B."),
+    ] = None,
+    image_size: ImageSize = None,
     range_m: Annotated[float | None, typer.Option("--range", min=1e-6, metavar="M", help="At this distance.")] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="A picture of the difference.")] = None,
     json: args.Json = False,
@@ -73,7 +80,14 @@ def compare(
         check_writable(plot)
         if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
             raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {plot.name}")
-    difference = compared(camera_in(a), camera_in(b), range_m=range_m)
+    if len(camera or []) > 2:
+        raise InputError("compare takes two cameras: give --camera once, or once for A and once for B")
+    of_a, of_b = (camera * 2)[:2] if camera else (None, None)
+    once = of_a if camera and len(camera) == 1 else None
+    left, right = (
+        camera_in(file, name, image_size, where_several=once is not None) for file, name in ((a, of_a), (b, of_b))
+    )
+    difference = compared(left, right, range_m=range_m)
     where = "at infinity" if range_m is None else f"at {range_m:g} m"
     say(
         f"{where}: rms {difference.rms_px:.4g} px, median {difference.median_px:.4g} px, "
@@ -117,18 +131,17 @@ def convert(
     if out is None or (params is not None and target is not None):
         raise InputError("convert takes IN and OUT, or with --params only OUT")
     check_writable(out)
-    errors: dict[str, float] = {}
+    found: LensFit | None = None
     record: dict[str, str] = {}
     if params is not None:
         converted = typed_camera(params, model, image_size, name or out.stem)
     else:
         key, imported = imported_from(Path(source), camera, from_format, image_size)
         say_problems(imported.notes)
-        record = {f"import {note.code}": note.message for note in imported.notes}
+        record = _record_in(Path(source)) | _noted(imported.notes)
         if fit is not None:
             found = fitted(imported, fit, **args.given(accept_error_px=accept_error, name=name or key))
-            errors = {"rms_px": found.rms_px, "worst_px": found.worst_px}
-            record["import fit"] = f"{fit}, rms {found.rms_px:.3g} px, worst {found.worst_px:.3g} px over the image"
+            record["import fit"] = f"{fit}, {found}"
             say(f"fitted {record['import fit']}")
             converted = found.camera
         else:
@@ -137,7 +150,9 @@ def convert(
     write_camera_file(converted, out, to_format, record)
     say(f"camera saved: {out}")
     if json:
-        print_json({"camera": camera_as_json(converted), "fit": errors or None, "output": str(out)})
+        keys = ("rms_px", "worst_px", "coverage")
+        fit_as_json = {key: getattr(found, key) for key in keys} if found else None
+        print_json({"camera": camera_as_json(converted), "fit": fit_as_json, "output": str(out)})
 
 
 def formats(json: args.Json = False) -> None:
@@ -145,25 +160,30 @@ def formats(json: args.Json = False) -> None:
     from opencsp_calib.registry import installed
 
     known = [format_ for _, format_ in sorted(installed().camera_formats.items())]
+    fitted = {f.name: tuple(getattr(f, "fitted", ())) for f in known}  # not every plugin says
+    can = {True: "yes", False: ""}
     rows = [
-        (f.name, f.title, "yes" if f.reads else "", "yes" if f.writes else "", " ".join(f.models), f.missing() or "")
+        (f.name, f.title, can[f.reads], can[f.writes], " ".join(f.models), ", ".join(fitted[f.name]), f.missing() or "")
         for f in known
     ]
-    say_table(("format", "program and file", "read", "write", "exact models", ""), rows)
+    say_table(("format", "program and file", "read", "write", "exact as", "only with --fit", ""), rows)
     if json:
         keys = ("name", "title", "reads", "writes", "models", "extensions")
-        print_json([{key: getattr(f, key) for key in keys} | {"missing": f.missing()} for f in known])
+        more = [{"fitted": fitted[f.name], "missing": f.missing()} for f in known]
+        print_json([{key: getattr(f, key) for key in keys} | rest for f, rest in zip(known, more, strict=True)])
 
 
 def undistort(
     camera: CameraFile,
     images: args.Images,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="DIR", help="Folder for the new images.")],
+    name: CameraName = None,
+    image_size: ImageSize = None,
 ) -> None:
     """Remove the lens distortion from images; they come out as a pinhole camera would have taken them."""
     from opencsp_calib.images import find_images, read_image, write_image
 
-    lens = camera_in(camera)
+    lens = camera_in(camera, name, image_size)
     files = find_images(images)
     if output.exists() and not output.is_dir():
         raise InputError(f"{output} is a file; give a folder")
@@ -181,22 +201,33 @@ def undistort(
 COMMANDS = (show, compare, convert, formats, undistort)
 
 
-def camera_in(path: Path, name: str | None = None) -> "Camera":
-    """The camera of a file in any format we read; an InputError if it is not exactly one of our models."""
-    key, imported = imported_from(path, name)
+def camera_in(
+    path: Path, name: str | None = None, image_size: str | None = None, *, where_several: bool = False
+) -> "Camera":
+    """The camera of a file in any format we read; an InputError if it is not exactly one of our models.
+
+    `where_several` says that the name is only meant where the file has several cameras.
+    """
+    key, imported = imported_from(path, name, image_size=image_size, where_several=where_several)
     say_problems(imported.notes)
     return _exact(imported, key)
 
 
 def imported_from(
-    path: Path, name: str | None = None, from_format: str | None = None, image_size: str | None = None
+    path: Path,
+    name: str | None = None,
+    from_format: str | None = None,
+    image_size: str | None = None,
+    *,
+    where_several: bool = False,
 ) -> "tuple[str, Imported]":
     """One camera of a file, and its name there."""
     from opencsp_calib.importing import pick, read_cameras
     from opencsp_calib.registry import installed
 
     size = size_from(image_size)
-    return pick(read_cameras(path, installed().camera_formats, size, from_format), name)
+    cameras = read_cameras(path, installed().camera_formats, size, from_format)
+    return pick(cameras, None if where_several and len(cameras) == 1 else name)
 
 
 def size_from(text: str | None) -> tuple[int, int] | None:
@@ -227,7 +258,8 @@ def typed_camera(params: str, model: str | None, image_size: str | None, name: s
 
 
 def write_camera_file(camera: "Camera", path: Path, to_format: str | None, record: dict[str, str]) -> None:
-    """Write a camera in the format named, or that its extension means."""
+    """Write a camera in the format named, or that its extension means, with the record where there is room for it."""
+    from opencsp_calib.interfaces import KeepsNotes
     from opencsp_calib.registry import installed
 
     writers = {name: f for name, f in installed().camera_formats.items() if f.writes}
@@ -241,12 +273,13 @@ def write_camera_file(camera: "Camera", path: Path, to_format: str | None, recor
             choice = ", ".join(fitting or sorted(writers))
             raise InputError(f"which format {path.name} should have cannot be told; add --to with one of {choice}")
         to_format = fitting[0]
-    if to_format == "opencsp" and record:
-        from opencsp_calib.hdf5 import save_camera
-
-        save_camera(camera, path, record)
+    writer = writers[to_format]
+    if record and isinstance(writer, KeepsNotes):
+        writer.write_with_notes({camera.name: camera}, path, record)
         return
-    installed().camera_format(to_format).write({camera.name: camera}, path)
+    writer.write({camera.name: camera}, path)
+    if record:
+        say(f"warning [notes-not-stored] {writer.title} has no room for notes; keep them yourself")
 
 
 def _typed_number(pair: str) -> tuple[str, float]:
@@ -255,6 +288,15 @@ def _typed_number(pair: str) -> tuple[str, float]:
         return name.strip(), float(value)
     except ValueError:
         raise InputError(f"--params takes NAME=NUMBER, such as fx=2710.0, not {pair.strip()!r}") from None
+
+
+def _noted(notes: "tuple[Problem, ...]") -> dict[str, str]:
+    """Notes by their code, all messages of one code together."""
+    found: dict[str, str] = {}
+    for note in notes:
+        key = f"import {note.code}"
+        found[key] = f"{found[key]}; {note.message}" if key in found else note.message
+    return found
 
 
 def _exact(imported: "Imported", name: str) -> "Camera":

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.cameras import CameraFile, calibration_in, camera_in
+from opencsp_calib.cli.cameras import CameraFile, CameraName, ImageSize, calibration_in, camera_in
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud
 from opencsp_calib.errors import FileFormatError, InputError
@@ -54,6 +54,8 @@ def check(
     camera: CameraFile,
     images: args.Images,
     board: args.OptionalBoardSpec = None,
+    name: CameraName = None,
+    image_size: ImageSize = None,
     jobs: args.Jobs = None,
     json: args.Json = False,
 ) -> None:
@@ -61,7 +63,7 @@ def check(
     from opencsp_calib import pipeline
     from opencsp_calib.check import check as checked
 
-    known = camera_in(camera)
+    known = camera_in(camera, name, image_size)
     calibration = calibration_in(camera)
     observations = _observed(images, board, jobs, calibration.observations.board if calibration else None)
     covariance = calibration.covariance if calibration else None

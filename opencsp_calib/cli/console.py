@@ -1,6 +1,7 @@
 """Where the command line's words go: people read standard error, programs read standard output."""
 
 import json
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ __all__ = [
 
 
 MAX_NAMED = 8  # images in one line
+NUMBER = re.compile(r"[-+±]?[\d.]|nan|inf|-?$")  # how a cell of a column of numbers begins
 
 
 def say(text: str) -> None:
@@ -47,13 +49,14 @@ def say_problems(problems: "tuple[Problem, ...]") -> None:
 
 
 def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    """A table for people."""
+    """A table for people: columns of numbers to the right."""
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, title in enumerate(header):
-        table.add_column(title, justify="left" if index == 0 else "right", no_wrap=index == 0)
+        numbers = index > 0 and all(NUMBER.match(row[index]) for row in rows)
+        table.add_column(title, justify="right" if numbers else "left", no_wrap=index == 0)
     for row in rows:
         table.add_row(*row)
     _console().print(table, soft_wrap=False)

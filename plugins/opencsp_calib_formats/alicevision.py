@@ -39,6 +39,7 @@ DISTORTION_OF_TYPE = {
 }
 """The distortion of a combined type, as files before 1.2.8 have it."""
 
+NEWEST = (1, 2, 11)  # of the versions whose rules are known
 COUNTS = {"none": 0, "radialk1": 1, "radialk3": 3, "radialk3pt": 3, "brown": 5, "fisheye": 4, "fisheye1": 1}
 
 HALF_PIXEL = unverified(
@@ -53,6 +54,7 @@ class AliceVision(FileFormat):
     title = "AliceVision and Meshroom (.sfm, JSON)"
     extensions = (".sfm", ".json")
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("fisheye1",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -71,6 +73,9 @@ def _imported(name: str, fields: Fields, version: Version) -> Imported:
     size = fields.size("width", "height")
     kind = fields.text("type", "pinhole")
     notes = _notes(fields, size)
+    if version > NEWEST:
+        known = ".".join(map(str, NEWEST))
+        notes += (unverified(f"the file is of a newer version than {known}: read by that one's rules"),)
     distortion = fields.text("distortionType", DISTORTION_OF_TYPE.get(kind, "")) or "none"
     undistortion = fields.text("undistortionType", "none")
     obstacles = []

@@ -28,6 +28,7 @@ class Aniposelib(FileFormat):
     title = "aniposelib, anipose, freemocap (TOML)"
     extensions = (".toml",)
     models = ("opencv4", "opencv5", "opencv8", "opencv12", "opencv14", "opencv_fisheye")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

@@ -42,6 +42,7 @@ class Basalt(FileFormat):
     title = "Basalt (JSON)"
     extensions = (".json",)
     models = ("pinhole", "opencv8", "opencv_fisheye")
+    fitted = ("ds", "eucm", "ucm", "fov")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

@@ -42,6 +42,7 @@ class BoofCV(FileFormat):
     title = "BoofCV (YAML)"
     extensions = (".yaml", ".yml")
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("skew", "over 3 radial terms", "omnidirectional")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

@@ -38,6 +38,7 @@ class Bouguet(FileFormat):
     title = "Bouguet's toolbox, Calib_Results (.mat, .m)"
     extensions = (".mat", ".m")
     models = ("opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

@@ -37,6 +37,7 @@ class Cahvor(FileFormat):
     title = "JPL CAHV, CAHVOR, CAHVORE (.cahvor, .cahv)"
     extensions = (".cahvor", ".cahv", ".cahvore")
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12")
+    fitted = ("CAHVOR off axis", "CAHVORE")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

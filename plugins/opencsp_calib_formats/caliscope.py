@@ -31,6 +31,7 @@ class Caliscope(FileFormat):
     title = "Caliscope (TOML)"
     extensions = (".toml",)
     models = ("opencv4", "opencv5", "opencv8", "opencv12", "opencv14", "opencv_fisheye")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

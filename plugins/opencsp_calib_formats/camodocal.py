@@ -33,6 +33,7 @@ class Camodocal(FileFormat):
     title = "camodocal, VINS (YAML)"
     extensions = (".yaml", ".yml")
     models = ("opencv4", "opencv8", "opencv_fisheye")
+    fitted = ("MEI", "SCARAMUZZA")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

@@ -23,13 +23,14 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.colmap_models import MODEL_OF_ID, PARAMETERS, imported
 from opencsp_calib_formats.fields import number, whole
 from opencsp_calib_formats.opencv_camera import carried
-from opencsp_calib_formats.reading import FileFormat, decimal, naming
+from opencsp_calib_formats.reading import FileFormat, TextFormat, comments, decimal, naming
 from opencsp_calib_formats.safe_text import head, read_bytes, read_text
 
 __all__ = ["ColmapBinary", "ColmapText"]
 
 WRITTEN = {"pinhole": "PINHOLE", "opencv4": "OPENCV", "opencv8": "FULL_OPENCV", "opencv_fisheye": "OPENCV_FISHEYE"}
 ID_OF_MODEL = {model: id_ for id_, model in MODEL_OF_ID.items()}
+FITTED = ("FOV", "DIVISION", "EUCM", "THIN_PRISM_FISHEYE", "RAD_TAN_THIN_PRISM_FISHEYE")
 RECORD = struct.Struct("<IiQQ")
 
 
@@ -43,14 +44,14 @@ class Entry(NamedTuple):
     params: tuple[float, ...]
 
 
-class ColmapText(FileFormat):
+class ColmapText(TextFormat):
     """Reads and writes cameras.txt."""
 
     name = "colmap"
     title = "COLMAP cameras.txt"
     extensions = (".txt",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv_fisheye")
+    fitted = FITTED
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`: by the first line that is no comment."""
@@ -62,14 +63,13 @@ class ColmapText(FileFormat):
         with naming(path):
             return _cameras([_of_words(words) for words in _lines(read_text(path))], path)
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`; names that are no numbers are replaced by 1, 2, ..."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`; names that are no numbers are replaced by 1, 2, ..."""
         entries = _entries(cameras, path, self.title)
         lines = ["# Camera list with one line of data per camera:", "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
-        lines.append(f"# Number of cameras: {len(entries)}")
+        lines += [f"# Number of cameras: {len(entries)}", *comments(notes)]
         lines += [f"{e.id} {e.model} {e.width} {e.height} {' '.join(map(decimal, e.params))}" for e in entries]
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return "\n".join(lines) + "\n"
 
 
 class ColmapBinary(FileFormat):
@@ -80,6 +80,7 @@ class ColmapBinary(FileFormat):
     extensions = (".bin",)
     writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv_fisheye")
+    fitted = FITTED
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`: the count and the models must fill the file exactly."""

@@ -46,6 +46,7 @@ class Halcon(FileFormat):
     title = "HALCON camera parameters (.dat, .cal)"
     extensions = (".dat", ".cal")
     models = ("pinhole",)
+    fitted = ("division", "polynomial")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

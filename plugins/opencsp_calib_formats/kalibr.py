@@ -18,7 +18,6 @@ import numpy as np
 
 from opencsp_calib import Camera, InputError
 from opencsp_calib.arrays import Floats, Points
-from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported
 from opencsp_calib.interfaces import Imported
@@ -26,7 +25,7 @@ from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.lens import brown, double_sphere, eucm, fov, omni, on_plane
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import other_camera
-from opencsp_calib_formats.reading import FileFormat, decimal, naming, only_one
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one
 from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
 
 __all__ = ["Kalibr"]
@@ -41,14 +40,14 @@ PAIRS = {
 }
 
 
-class Kalibr(FileFormat):
+class Kalibr(TextFormat):
     """Reads all cameras of a chain; writes one, because a chain needs the transforms between its cameras."""
 
     name = "kalibr"
     title = "Kalibr camchain (YAML)"
     extensions = (".yaml", ".yml")
-    writes = True
     models = ("pinhole", "opencv4", "opencv_fisheye")
+    fitted = ("omni", "eucm", "ds", "fov")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -71,8 +70,8 @@ class Kalibr(FileFormat):
                         cameras[key] = _imported(f"{path.stem} {key}", fields)
             return cameras
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
         if len(cameras) > 1:
             raise InputError(
                 f"cannot write {path}: a chain needs the transforms between its cameras; choose one with --camera"
@@ -81,6 +80,7 @@ class Kalibr(FileFormat):
         model, coefficients = carried(camera, self.models, path, self.title)
         kind = {"pinhole": "none", "opencv4": "radtan", "opencv_fisheye": "equidistant"}[model]
         lines = [
+            *comments(notes),
             "cam0:",
             "  cam_overlaps: []",
             "  camera_model: pinhole",
@@ -90,8 +90,7 @@ class Kalibr(FileFormat):
             f"  resolution: [{camera.image_size[0]}, {camera.image_size[1]}]",
             "  rostopic: /cam0/image_raw",
         ]
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "\n".join(lines) + "\n"
 
 
 def _listed(values: Floats) -> str:

@@ -44,6 +44,7 @@ class Matlab(FileFormat):
     title = "MATLAB cameraParameters, cameraIntrinsics (.mat, JSON)"
     extensions = (".mat", ".json")
     models = ("opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("skew", "fisheyeIntrinsics")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

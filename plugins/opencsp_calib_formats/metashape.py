@@ -11,7 +11,7 @@ Metashape manual, appendix "Camera models". PhotoScan before 1.2 wrote fx, fy, s
 in OpenCV's meaning (Agisoft Lens manual).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
@@ -19,7 +19,6 @@ import numpy as np
 
 from opencsp_calib import Camera, Problem
 from opencsp_calib.arrays import Floats, Points
-from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -27,7 +26,7 @@ from opencsp_calib_formats.fields import Fields, number
 from opencsp_calib_formats.lens import brown, equidistant, equisolid, on_plane
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import each_camera, other_camera
-from opencsp_calib_formats.reading import FileFormat, naming, not_a_result, only_one, unverified
+from opencsp_calib_formats.reading import TextFormat, naming, not_a_result, only_one, unverified, xml_comments
 from opencsp_calib_formats.safe_text import head, parse_xml, read_bytes
 
 __all__ = ["Metashape"]
@@ -42,14 +41,14 @@ RADIAL, TANGENTIAL = ("k1", "k2", "k3", "k4"), ("p1", "p2", "p3", "p4")
 TERMS = ("f", "fx", "fy", "cx", "cy", "b1", "b2", "skew", *RADIAL, *TANGENTIAL)
 
 
-class Metashape(FileFormat):
+class Metashape(TextFormat):
     """Reads lenses and chunks, writes a lens."""
 
     name = "metashape"
     title = "Agisoft Metashape (XML)"
     extensions = (".xml",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("b2", "k4", "p3", "p4", "equisolid fisheye")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -63,31 +62,34 @@ class Metashape(FileFormat):
             if root.tag == "calibration":
                 kind = (root.findtext("projection") or "frame").strip()
                 return {"camera": _imported("camera", root, kind, _child_size(root))}
-            sensors = list(root.iter("sensor"))
-            if root.tag not in ("document", "chunk") or not sensors:
+            chunks = [chunk for chunk in root.iter("chunk") if next(chunk.iter("sensor"), None) is not None]
+            if root.tag not in ("document", "chunk") or not chunks:
                 raise FileFormatError("no <calibration> and no <sensor> of Metashape in it")
-            return _of_sensors(sensors)
+            return _of_chunks(chunks)
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
-        text = _written(only_one(cameras, path, self.title), path)
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
+        return _written(only_one(cameras, path, self.title), path, notes)
 
 
-def _of_sensors(sensors: list[Element]) -> dict[str, Imported]:
+def _of_chunks(chunks: list[Element]) -> dict[str, Imported]:
+    calibrated = [found for chunk in chunks for found in _calibrated(chunk)]
+    if not calibrated:
+        raise FileFormatError("none of its sensors has a <calibration>: align the photos first")
+    named = ((found[0].get("label") or found[0].get("id") or "camera", found) for found in calibrated)
+    return each_camera(named, lambda name, found: _of_sensor(name, *found))
+
+
+def _calibrated(chunk: Element) -> Iterator[tuple[Element, Element]]:
+    """The sensors of a chunk with their calibration, which may be that of their master; ids are a chunk's own."""
+    sensors = list(chunk.iter("sensor"))
     by_id = {sensor.get("id"): sensor for sensor in sensors}
-    calibrated = []
     for sensor in sensors:
         calibration = _calibration(sensor)
         if calibration is None and sensor.get("master_id") in by_id:
             calibration = _calibration(by_id[sensor.get("master_id")])
         if calibration is not None:
-            calibrated.append((sensor, calibration))
-    if not calibrated:
-        raise FileFormatError("none of its sensors has a <calibration>: align the photos first")
-    named = ((found[0].get("label") or found[0].get("id") or "camera", found) for found in calibrated)
-    return each_camera(named, lambda name, found: _of_sensor(name, *found))
+            yield sensor, calibration
 
 
 def _calibration(sensor: Element) -> Element | None:
@@ -187,7 +189,7 @@ def _obstacles(terms: dict[str, float], kind: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _written(camera: Camera, path: Path) -> str:
+def _written(camera: Camera, path: Path, notes: Mapping[str, str]) -> str:
     model, distortion = carried(camera, Metashape.models, path, Metashape.title)
     fx, fy, cx, cy = camera.params[:4]
     width, height = camera.image_size
@@ -199,6 +201,7 @@ def _written(camera: Camera, path: Path) -> str:
     return "\n".join(
         [
             '<?xml version="1.0" encoding="UTF-8"?>',
+            *xml_comments(notes),
             "<calibration>",
             f"  <projection>{'fisheye' if fisheye else 'frame'}</projection>",
             f"  <width>{width}</width>",

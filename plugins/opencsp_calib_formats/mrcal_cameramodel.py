@@ -15,13 +15,12 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from opencsp_calib import Camera
-from opencsp_calib.atomic import replacing
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.mrcal_models import imported
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.python_literal import parse_literal
-from opencsp_calib_formats.reading import FileFormat, decimal, naming, only_one
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one
 from opencsp_calib_formats.safe_text import head, read_text
 
 __all__ = ["MrcalCameraModel"]
@@ -29,20 +28,21 @@ __all__ = ["MrcalCameraModel"]
 MODEL_KEYS = ("lensmodel", "lens_model", "distortion_model")
 
 
-class MrcalCameraModel(FileFormat):
+class MrcalCameraModel(TextFormat):
     """Reads and writes one camera."""
 
     name = "mrcal"
     title = "mrcal .cameramodel"
     extensions = (".cameramodel",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12")
+    fitted = ("CAHVOR off axis", "CAHVORE", "STEREOGRAPHIC", "LONLAT", "LATLON")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
         text = head(path)
         return bool(
             re.search(rf"['\"]({'|'.join(MODEL_KEYS)})['\"]\s*:\s*b?['\"](LENSMODEL|DISTORTION)_", text)
+            and re.search(r"['\"]intrinsics['\"]\s*:", text)
             and re.match(r"(\s|#[^\n]*)*\{", text)
         )
 
@@ -54,14 +54,15 @@ class MrcalCameraModel(FileFormat):
             width, height = (whole(side, "imagersize") for side in fields.numbers("imagersize", 2))
             return {"camera": imported(path.stem, lensmodel, fields.numbers("intrinsics"), (width, height))}
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
         camera = only_one(cameras, path, self.title)
         model, coefficients = carried(camera, self.models, path, self.title)
         values = ", ".join(decimal(value) for value in (*camera.params[:4], *coefficients))
         comment = camera.name.encode("unicode_escape").decode("ascii")
         lines = [
             f"# {comment}",
+            *comments(notes),
             "{",
             f"    'lensmodel':  'LENSMODEL_{model.upper()}',",
             f"    'intrinsics': [ {values} ],",
@@ -69,5 +70,4 @@ class MrcalCameraModel(FileFormat):
             f"    'imagersize': [ {camera.image_size[0]}, {camera.image_size[1]} ],",
             "}",
         ]
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="ascii")
+        return "\n".join(lines) + "\n"

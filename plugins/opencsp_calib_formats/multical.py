@@ -4,6 +4,7 @@ Source: multical, ``io/export_calib.py``; the coefficients of ``standard``, ``ra
 are OpenCV's 5, 8, 12 and 14, in a list of one list.
 """
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -27,11 +28,13 @@ class Multical(FileFormat):
     title = "multical (JSON)"
     extensions = (".json",)
     models = ("opencv4", "opencv5", "opencv8", "opencv12", "opencv14")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
         text = head(path)
-        return text.lstrip().startswith("{") and all(f'"{k}"' in text for k in ("cameras", "image_size", "K", "dist"))
+        named = all(f'"{key}"' in text for key in ("image_size", "K", "dist"))
+        return named and text.lstrip().startswith("{") and re.search(r'"cameras"\s*:\s*\{', text) is not None
 
     def read(self, path: Path) -> Mapping[str, Imported]:
         """See `CameraFormat.read`."""

@@ -42,6 +42,7 @@ class Nvm(FileFormat):
     title = "VisualSFM (.nvm)"
     extensions = (".nvm",)
     models = ("pinhole",)
+    fitted = ("r",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

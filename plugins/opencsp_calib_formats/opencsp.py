@@ -36,4 +36,8 @@ class OpenCSP(FileFormat):
 
     def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
         """See `CameraFormat.write`."""
-        save_camera(only_one(cameras, path, self.title), path)
+        self.write_with_notes(cameras, path, {})
+
+    def write_with_notes(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> None:
+        """See `KeepsNotes.write_with_notes`."""
+        save_camera(only_one(cameras, path, self.title), path, notes)

@@ -17,29 +17,31 @@ from xml.sax.saxutils import escape
 
 from opencsp_calib import Camera, InputError
 from opencsp_calib.arrays import Floats
-from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, matrix, numbers
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
-from opencsp_calib_formats.opencv_keys import fisheye_of, image_size_of, named_pairs
-from opencsp_calib_formats.reading import FileFormat, decimal, naming
+from opencsp_calib_formats.opencv_keys import fisheye_of, image_size_of, is_image_size, named_pairs
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, xml_comments
 from opencsp_calib_formats.safe_text import Repeated, head, parse_json, parse_xml, parse_yaml, read_bytes, read_text
 
 __all__ = ["OpenCVFileStorage", "is_ros"]
 
 HINT = re.compile(r"opencv|mtx|matrix|intrinsic|(?<![A-Za-z])[KM]\d?(?![A-Za-z])", re.IGNORECASE)
 MAX_BYTES = 8 * 2**20
+MAX_DEPTH = 4
+MAX_CAMERAS = 1000
+EMPTY: Mapping[str, Any] = {}
 
 
-class OpenCVFileStorage(FileFormat):
+class OpenCVFileStorage(TextFormat):
     """Reads and writes one camera, or the two of a stereo pair."""
 
     name = "opencv"
     title = "OpenCV FileStorage (YAML, XML, JSON)"
     extensions = (".yml", ".yaml", ".xml", ".json")
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12", "opencv14", "opencv_fisheye")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`: a matrix and coefficients, and none of another program's marks."""
@@ -61,12 +63,11 @@ class OpenCVFileStorage(FileFormat):
                 raise FileFormatError("no camera matrix with distortion coefficients under a name we know")
             return cameras
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`; two cameras become M1 D1 M2 D2, as OpenCV's stereo sample has them."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`; two cameras become M1 D1 M2 D2, as OpenCV's stereo sample has them."""
         entries = _entries(tuple(cameras.values()), path)
         writer = {".xml": _as_xml, ".json": _as_json}.get(path.suffix.lower(), _as_yaml)
-        with replacing(path) as temporary:
-            temporary.write_text(writer(entries), encoding="utf-8")
+        return writer(entries, notes)
 
 
 def is_ros(values: Mapping[str, Any]) -> bool:
@@ -107,20 +108,24 @@ def _of_element(element: Element) -> Any:
     return values
 
 
-def _groups(root: Any) -> Iterator[tuple[str, Fields]]:
+def _groups(value: Any, name: str = "", around: Mapping[str, Any] = EMPTY) -> Iterator[tuple[str, Fields]]:
     """The mappings that may hold cameras, by name: the file's own, or those within it, which take over its size."""
-    if isinstance(root, list):
-        root = {str(index): value for index, value in enumerate(root)}
-    top = Fields(root)
-    if any(distortion for _, distortion in named_pairs(top.values).values()):
-        yield "", top
+    if name.count(".") >= MAX_DEPTH:
         return
-    if "camera_poses" in top:  # multical's
+    if isinstance(value, list):
+        if len(value) > MAX_CAMERAS or not all(isinstance(item, Mapping) for item in value):
+            return
+        value = {str(index): item for index, item in enumerate(value)}
+    if not isinstance(value, Mapping) or "camera_poses" in value:  # multical's
         return
-    shared = {key: value for key, value in top.values.items() if not isinstance(value, Mapping)}
-    for key, value in top.values.items():
-        if isinstance(value, Mapping) and named_pairs(value):
-            yield str(key), Fields({**shared, **value}, str(key))
+    pairs = named_pairs(value).values()
+    if any(distortion for _, distortion in pairs) or (name and pairs):
+        yield name, Fields({**around, **value}, name)
+        return
+    shared = {**around, **{key: item for key, item in value.items() if not isinstance(item, Mapping | list)}}
+    shared |= {key: value[key] for key in value if is_image_size(key)}
+    for key, item in value.items():
+        yield from _groups(item, f"{name}.{key}" if name else str(key), shared)
 
 
 def _cameras(group: str, fields: Fields, stem: str) -> dict[str, Imported]:
@@ -171,8 +176,8 @@ def _entries(cameras: tuple[Camera, ...], path: Path) -> dict[str, Any]:
     return entries
 
 
-def _as_yaml(entries: dict[str, Any]) -> str:
-    lines = ["%YAML:1.0", "---"]
+def _as_yaml(entries: dict[str, Any], notes: Mapping[str, str]) -> str:
+    lines = ["%YAML:1.0", "---", *comments(notes)]
     for key, value in entries.items():
         if isinstance(value, int | str):
             lines.append(f"{key}: {json.dumps(value, ensure_ascii=False)}")
@@ -183,8 +188,8 @@ def _as_yaml(entries: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _as_xml(entries: dict[str, Any]) -> str:
-    lines = ['<?xml version="1.0"?>', "<opencv_storage>"]
+def _as_xml(entries: dict[str, Any], notes: Mapping[str, str]) -> str:
+    lines = ['<?xml version="1.0"?>', "<opencv_storage>", *xml_comments(notes)]
     for key, value in entries.items():
         if isinstance(value, int | str):
             text = str(value) if isinstance(value, int) else escape(f'"{value}"', {'"': "&quot;"})
@@ -196,9 +201,9 @@ def _as_xml(entries: dict[str, Any]) -> str:
     return "\n".join([*lines, "</opencv_storage>", ""])
 
 
-def _as_json(entries: dict[str, Any]) -> str:
+def _as_json(entries: dict[str, Any], notes: Mapping[str, str]) -> str:
     lines = []
-    for key, value in entries.items():
+    for key, value in {**entries, **_keys(notes)}.items():
         if isinstance(value, int | str):
             lines.append(f'    "{key}": {json.dumps(value, ensure_ascii=False)}')
         else:
@@ -206,6 +211,11 @@ def _as_json(entries: dict[str, Any]) -> str:
             head_ = f'"type_id": "opencv-matrix", "rows": {rows}, "cols": {columns}, "dt": "d"'
             lines.append(f'    "{key}": {{ {head_}, "data": [ {", ".join(data)} ] }}')
     return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _keys(notes: Mapping[str, str]) -> dict[str, str]:
+    """Notes under names that OpenCV's parser takes: letters, digits, hyphens and underscores."""
+    return {re.sub(r"\W+", "_", subject): note for subject, note in notes.items()}
 
 
 def _parts(value: Floats) -> tuple[int, int, list[str]]:

@@ -16,7 +16,7 @@ from opencsp_calib.errors import FileFormatError
 from opencsp_calib_formats.fields import Fields, numbers, whole
 from opencsp_calib_formats.reading import unverified
 
-__all__ = ["fisheye_of", "image_size_of", "named_pairs"]
+__all__ = ["fisheye_of", "image_size_of", "is_image_size", "named_pairs"]
 
 MATRIX: tuple[str, ...] = (
     "cameramatrix",
@@ -154,6 +154,11 @@ def image_size_of(fields: Fields, side: str, centre: Floats) -> tuple[tuple[int,
             if _is_pair(values.get(name + end)):
                 return _pair(values[name + end], fields.path(keys[name + end]), centre, height_first=name in SHAPE)
     return None, ()
+
+
+def is_image_size(key: Any) -> bool:
+    """Whether a name is one for an image size, as a pair or a mapping."""
+    return plain(key) in SIZE + SHAPE
 
 
 def _pair(value: Any, what: str, centre: Floats, *, height_first: bool) -> tuple[tuple[int, int], tuple[Problem, ...]]:

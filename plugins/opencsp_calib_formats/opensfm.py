@@ -15,14 +15,13 @@ import numpy as np
 
 from opencsp_calib import Camera, InputError, Problem
 from opencsp_calib.arrays import Floats
-from opencsp_calib.atomic import replacing
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, equidistant
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
-from opencsp_calib_formats.reading import FileFormat, naming, not_a_result
+from opencsp_calib_formats.reading import TextFormat, naming, not_a_result
 from opencsp_calib_formats.safe_text import MAX_BYTES, head, parse_json, read_text
 
 __all__ = ["OpenSfM"]
@@ -44,14 +43,14 @@ FISHEYE_624 = (*FISHEYE_62, "s0", "s1", "s2", "s3")
 GUESS = "OpenSfM's camera_models.json holds what it starts from, not a result; take reconstruction.json"
 
 
-class OpenSfM(FileFormat):
+class OpenSfM(TextFormat):
     """Reads all three files; writes what ODM reads with ``--cameras``."""
 
     name = "opensfm"
     title = "OpenSfM and OpenDroneMap (JSON)"
     extensions = (".json",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("fisheye62", "fisheye624")
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -66,13 +65,12 @@ class OpenSfM(FileFormat):
             notes = (not_a_result(GUESS),) if guess or path.name == "camera_models.json" else ()
             return each_camera(found, lambda name, fields: _imported(name, fields, notes))
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`; notes stand within each camera, because all that is at the top is a camera."""
         if not cameras:
             raise InputError(f"cannot write {path}: no camera")
-        content = {name: _written(camera, path) for name, camera in cameras.items()}
-        with replacing(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=4) + "\n", encoding="utf-8")
+        content = {name: {**_written(camera, path), **notes} for name, camera in cameras.items()}
+        return json.dumps(content, indent=4) + "\n"
 
 
 def _cameras(content: Any) -> tuple[list[tuple[str, Fields]], bool]:

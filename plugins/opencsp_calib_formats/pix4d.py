@@ -42,6 +42,7 @@ class Pix4D(FileFormat):
     title = "Pix4D (.cam, calibrated_camera_parameters.txt)"
     extensions = (".cam", ".txt")
     models = ("opencv5",)
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

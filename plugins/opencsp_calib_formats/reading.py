@@ -6,10 +6,12 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from opencsp_calib import Camera, InputError, Problem
+from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.interfaces import Imported
 
-__all__ = ["FileFormat", "decimal", "naming", "not_a_result", "only_one", "unverified"]
+__all__ = ["FileFormat", "TextFormat", "comments", "decimal", "naming", "not_a_result", "only_one", "unverified"]
+__all__ += ["xml_comments"]
 
 
 class FileFormat(ABC):
@@ -19,6 +21,8 @@ class FileFormat(ABC):
     title: str
     extensions: tuple[str, ...]
     models: tuple[str, ...]
+    fitted: tuple[str, ...] = ()
+    """What the program has that none of our models is: read for ``--fit`` only."""
     reads = True
     writes = False
 
@@ -37,6 +41,37 @@ class FileFormat(ABC):
     def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
         """See `CameraFormat.write`."""
         raise InputError(f"{path} cannot be written: {self.title} is only read")
+
+
+class TextFormat(FileFormat):
+    """A format that is written as text, with room for notes."""
+
+    writes = True
+
+    @abstractmethod
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """What the file will hold; raises InputError where the format cannot carry a camera exactly."""
+
+    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
+        """See `CameraFormat.write`."""
+        self.write_with_notes(cameras, path, {})
+
+    def write_with_notes(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> None:
+        """See `KeepsNotes.write_with_notes`."""
+        text = self.text(cameras, path, notes)
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+
+
+def comments(notes: Mapping[str, str]) -> list[str]:
+    """Notes as the lines of a comment, of plain characters, as in YAML, ini and Python."""
+    lines = (" ".join(f"# {subject}: {note}".split()) for subject, note in notes.items())
+    return [line.encode("ascii", "backslashreplace").decode("ascii") for line in lines]
+
+
+def xml_comments(notes: Mapping[str, str]) -> list[str]:
+    """Notes as comments of XML, within which there must be no double hyphen."""
+    return [f"<!--{line[1:].replace('--', '- -')} -->" for line in comments(notes)]
 
 
 @contextmanager

@@ -46,6 +46,7 @@ class RealityCapture(FileFormat):
     title = "RealityCapture and RealityScan (XMP)"
     extensions = (".xmp",)
     models = ("pinhole", "opencv5")
+    fitted = ("k4",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""

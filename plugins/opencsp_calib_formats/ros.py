@@ -18,14 +18,13 @@ import numpy as np
 
 from opencsp_calib import Camera, InputError, Problem
 from opencsp_calib.arrays import Floats, Params
-from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, matrix, numbers, whole
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
 from opencsp_calib_formats.opencv_filestorage import is_ros
-from opencsp_calib_formats.reading import FileFormat, decimal, naming, only_one, unverified
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one, unverified
 from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
 
 __all__ = ["RosCameraInfo", "RosIni"]
@@ -35,14 +34,14 @@ KIND = {"opencv5": "plumb_bob", "opencv8": "rational_polynomial", "opencv_fishey
 INI_PARTS = ("camera matrix", "distortion", "rectification", "projection")
 
 
-class RosCameraInfo(FileFormat):
+class RosCameraInfo(TextFormat):
     """Reads and writes camera_info as YAML; reads messages."""
 
     name = "ros"
     title = "ROS camera_info (YAML)"
     extensions = (".yaml", ".yml")
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv_fisheye")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -63,12 +62,12 @@ class RosCameraInfo(FileFormat):
                     cameras |= _of_document(Fields(document), path.stem)
             return cameras
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
         camera = only_one(cameras, path, self.title)
         model, coefficients = carried(camera, tuple(KIND), path, self.title)
         width, height = camera.image_size
-        lines = [f"image_width: {width}", f"image_height: {height}"]
+        lines = [*comments(notes), f"image_width: {width}", f"image_height: {height}"]
         lines += [
             f"camera_name: {json.dumps(camera.name, ensure_ascii=False)}",
             *_matrix("camera_matrix", camera.matrix),
@@ -76,18 +75,17 @@ class RosCameraInfo(FileFormat):
         lines += [f"distortion_model: {KIND[model]}", *_matrix("distortion_coefficients", coefficients[None])]
         lines += _matrix("rectification_matrix", np.eye(3))
         lines += _matrix("projection_matrix", np.column_stack([camera.matrix, np.zeros(3)]))
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "\n".join(lines) + "\n"
 
 
-class RosIni(FileFormat):
+class RosIni(TextFormat):
     """Reads and writes camera_info as an ini file; it has no name for the lens model, only 5 or 8 numbers."""
 
     name = "ros-ini"
     title = "ROS camera_info (ini)"
     extensions = (".ini",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8")
+    fitted = ("skew",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -99,8 +97,8 @@ class RosIni(FileFormat):
         with naming(path):
             return _of_ini(read_text(path), path.stem)
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
         camera = only_one(cameras, path, self.title)
         _, coefficients = carried(camera, tuple(KIND)[:2], path, self.title)
         if not re.fullmatch(r"[\w/.-]+", camera.name):
@@ -108,12 +106,12 @@ class RosIni(FileFormat):
                 f"cannot write {path}: the name {camera.name!r} does not fit an ini section; rename the camera"
             )
         width, height = camera.image_size
-        lines = ["[image]", "", "width", str(width), "", "height", str(height), "", f"[{camera.name}]"]
+        lines = [*comments(notes), "[image]", "", "width", str(width), "", "height", str(height), ""]
+        lines.append(f"[{camera.name}]")
         values = (camera.matrix, coefficients[None], np.eye(3), np.column_stack([camera.matrix, np.zeros(3)]))
         for part, value in zip(INI_PARTS, values, strict=True):
             lines += ["", part, *(" ".join(decimal(number) for number in row) for row in value)]
-        with replacing(path) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return "\n".join(lines) + "\n"
 
 
 def _of_document(fields: Fields, stem: str) -> dict[str, Imported]:

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from opencsp_calib import Camera
-from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -22,7 +21,7 @@ from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, on_plane
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
-from opencsp_calib_formats.reading import FileFormat, naming, only_one
+from opencsp_calib_formats.reading import TextFormat, naming, only_one
 from opencsp_calib_formats.safe_text import head, parse_json, read_text
 
 __all__ = ["TransformsJson"]
@@ -38,14 +37,14 @@ PERSPECTIVE = ("SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV")
 FISHEYE = "OPENCV_FISHEYE"
 
 
-class TransformsJson(FileFormat):
+class TransformsJson(TextFormat):
     """Reads the intrinsics of all frames; writes a file with intrinsics and no frames."""
 
     name = "transforms_json"
     title = "nerfstudio and instant-ngp (transforms.json)"
     extensions = (".json",)
-    writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("k4",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
@@ -63,11 +62,10 @@ class TransformsJson(FileFormat):
                 different = [("camera", different[0][1])]
             return each_camera(different, lambda name, values: _imported(name, Fields(values, name)))
 
-    def write(self, cameras: Mapping[str, Camera], path: Path) -> None:
-        """See `CameraFormat.write`."""
-        content = _written(only_one(cameras, path, self.title), path)
-        with replacing(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=4) + "\n", encoding="utf-8")
+    def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
+        """See `TextFormat.text`."""
+        content = {**_written(only_one(cameras, path, self.title), path), **notes}
+        return json.dumps(content, indent=4) + "\n"
 
 
 def _cameras(content: Fields) -> Iterator[tuple[str, dict[str, Any]]]:

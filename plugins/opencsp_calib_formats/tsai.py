@@ -36,6 +36,7 @@ class Tsai(FileFormat):
     title = "Ames Stereo Pipeline (.tsai)"
     extensions = (".tsai",)
     models = ("pinhole", "opencv4", "opencv5", "opencv_fisheye")
+    fitted = ("FOV",)
 
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
