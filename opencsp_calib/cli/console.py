@@ -26,6 +26,7 @@ __all__ = [
 
 
 MAX_NAMED = 8  # images in one line
+PIPED_WIDTH = 200  # of a table in a file or pipe, which has no width of its own
 NUMBER = re.compile(r"[-+±]?[\d.]|nan|inf|-?$")  # how a cell of a column of numbers begins
 
 
@@ -53,13 +54,16 @@ def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
     from rich import box
     from rich.table import Table
 
+    console = _console()
+    if not console.is_terminal:
+        console.width = PIPED_WIDTH
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for index, title in enumerate(header):
         numbers = index > 0 and all(NUMBER.match(row[index]) for row in rows)
-        table.add_column(title, justify="right" if numbers else "left", no_wrap=index == 0)
+        table.add_column(title, justify="right" if numbers else "left", no_wrap=index == 0, overflow="fold")
     for row in rows:
         table.add_row(*row)
-    _console().print(table, soft_wrap=False)
+    console.print(table, soft_wrap=False)
 
 
 def print_json(content: Any) -> None:

@@ -155,3 +155,13 @@ def test_a_scene_before_calibration_is_no_result(data_dir: Path) -> None:
 def test_refused(tmp_path: Path, fields: dict) -> None:
     with pytest.raises(FileFormatError):
         read(tmp_path, fields)
+
+
+def test_a_version_newer_than_we_know_is_read_with_a_warning(tmp_path: Path) -> None:
+    path = tmp_path / "cameras.sfm"
+    intrinsic = {"intrinsicId": "1", "width": "400", "height": "300", "type": "pinhole", "focalLength": "4"}
+    intrinsic |= {"sensorWidth": "8", "principalPoint": ["0", "0"], "distortionType": "none"}
+    for version, warned in ((["1", "2", "11"], False), (["1", "2", "12"], True), (["1", "3", "0"], True)):
+        path.write_text(json.dumps({"version": version, "intrinsics": [intrinsic]}))
+        notes = AliceVision().read(path)["1"].notes
+        assert any("newer version" in note.message for note in notes) is warned

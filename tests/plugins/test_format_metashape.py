@@ -187,3 +187,21 @@ def test_what_it_cannot_carry_is_refused_and_nothing_is_written(tmp_path: Path) 
     with pytest.raises(InputError, match="one camera"):
         Metashape().write({"x": plain, "y": plain}, tmp_path / "lens.xml")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_ids_of_sensors_are_those_of_their_chunk(tmp_path: Path) -> None:
+    def chunk(f: int) -> str:
+        adjusted = f'<calibration type="frame" class="adjusted"><f>{f}</f></calibration>'
+        size = f'<resolution width="{W}" height="{H}"/>'
+        master = f'<sensor id="0" label="master {f}" type="frame">{size}{adjusted}</sensor>'
+        return f'<chunk>{master}<sensor id="1" label="slave {f}" type="frame" master_id="0">{size}</sensor></chunk>'
+
+    path = tmp_path / "cameras.xml"
+    path.write_text(f"<document>{chunk(900)}{chunk(700)}</document>")
+    cameras = Metashape().read(path)
+    assert {name: exact(imported).params[0] for name, imported in cameras.items()} == {
+        "master 900": 900,
+        "slave 900": 900,
+        "master 700": 700,
+        "slave 700": 700,
+    }

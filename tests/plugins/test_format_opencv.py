@@ -14,9 +14,10 @@ from opencsp_calib_formats.opencv_filestorage import OpenCVFileStorage
 
 from opencsp_calib import Camera, InputError
 from opencsp_calib.errors import FileFormatError, NotExactError
-from opencsp_calib.importing import exact, pick
+from opencsp_calib.importing import exact, pick, recognise
 from opencsp_calib.interfaces import Imported
 from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.registry import installed
 
 K = [[900.5, 0.0, 502.0], [0.0, 901.5, 398.5], [0.0, 0.0, 1.0]]
 D = [-0.1, 0.02, 0.001, -0.002, -0.003]
@@ -231,3 +232,34 @@ def test_real_files(data_dir: Path) -> None:
             camera = exact(imported if imported.resize is None else imported.resize((640, 480)))
             np.testing.assert_array_equal(camera.matrix, storage.getNode(matrix).mat())
             np.testing.assert_array_equal(camera.distortion, storage.getNode(distortion).mat().ravel())
+
+
+@pytest.mark.parametrize(
+    ("content", "names"),
+    [
+        (
+            {"cameras": [{"K": K, "dist": D}, {"K": K, "dist": D}], "image_size": [1000, 800]},
+            ["cameras.0", "cameras.1"],
+        ),
+        ({"calibration": {"result": {"mtx": K, "dist": D}, "img_size": [1000, 800]}}, ["calibration.result"]),
+        (
+            {
+                "resolution": {"width": 1000.0, "height": 800.0},
+                "cameraIntrinsics": {"rows": 3, "cols": 3, "type": 6, "data": FLAT},
+                "distCoeffs": {"rows": 1, "cols": 5, "type": 6, "data": D},
+                "lensmodel": "LENSMODEL_OPENCV",
+            },
+            ["camera"],
+        ),
+    ],
+)
+def test_cameras_deep_in_a_home_made_file(content: object, names: list[str], tmp_path: Path) -> None:
+    path = tmp_path / "calibration.json"
+    path.write_text(json.dumps(content))
+    assert recognise(path, installed().camera_formats).name == "opencv"
+    cameras = FORMAT.read(path)
+    assert list(cameras) == names
+    for imported in cameras.values():
+        camera = exact(imported)
+        assert camera.image_size == (1000, 800)
+        assert camera.params.tolist() == [900.5, 901.5, 502.0, 398.5, *D]
