@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Points, checked
 from opencsp_calib.atomic import replacing
@@ -125,6 +124,8 @@ def _in_board_frame(board: Board, measured: Points, path: Path) -> Points:
             f"{path}: the points are {spread:.4g} times as far apart as the corners of {board.spec}; "
             "they must be in metres, and the squares of the size given"
         )
+    from scipy.spatial.transform import Rotation
+
     turn, _ = Rotation.align_vectors(board.nominal_points - nominal_centre, measured - centre)
     moved = np.asarray(turn.apply(measured - centre) + nominal_centre, dtype=np.float64)
     if _farthest(board, moved) >= ODD:

@@ -13,6 +13,7 @@ from pathlib import Path
 from socket import gethostname
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.errors import CancelledError, InputError, MissingDependencyError
 from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
@@ -159,7 +160,7 @@ def _look_there(kind: Kind, encoded: EncodedImage, place: str) -> Look | None:
         if seen.sha256 != encoded.sha256:
             return None
         encoded = replace(encoded, data=seen.data)
-    with opencv_on_one_thread():  # a worker's threads are Dask's: one a core
+    with opencv_on_one_thread(), blas_on_one_thread():  # a worker's threads are Dask's: one a core
         return Search(board, installed().detector(detector), refine).look(encoded)
 
 

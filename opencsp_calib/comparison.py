@@ -14,11 +14,11 @@ from dataclasses import dataclass, field
 from math import isfinite
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Mask, Matrix, Pixels, Points, Vector, frozen
 from opencsp_calib.camera import Camera
 from opencsp_calib.errors import InputError
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 
 __all__ = ["GRID", "Difference", "compare", "frame_jacobian", "pixel_grid"]
 
@@ -87,7 +87,7 @@ class Difference:
     @property
     def rotation_deg(self) -> float:
         """Angle of the rotation between the frames."""
-        return float(np.degrees(Rotation.from_matrix(self.rotation.copy()).magnitude()))
+        return float(np.degrees(np.linalg.norm(rotation_vectors(self.rotation))))
 
 
 def compare(a: Camera, b: Camera, *, range_m: float | None = None, grid: tuple[int, int] = GRID) -> Difference:
@@ -191,9 +191,9 @@ def _fit_frame(
         step, promised = _frame_step(camera, moved[used], error[used], damping, shifted=shifted)
         if promised <= SMALL_GAIN * _cost(error, used) or damping > MAX_DAMPING:
             break
-        turn = Rotation.from_rotvec(step[:3])
-        new_rotation = turn.as_matrix() @ rotation
-        new_offset = turn.apply(offset) + (step[3:] if shifted else 0.0)
+        turn = rotation_matrices(step[:3])
+        new_rotation = turn @ rotation
+        new_offset = turn @ offset + (step[3:] if shifted else 0.0)
         new_moved = points @ new_rotation.T + new_offset
         new_error = camera.project(new_moved) - pixels
         both = np.asarray(used & np.isfinite(new_error).all(axis=1))

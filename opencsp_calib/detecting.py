@@ -10,6 +10,7 @@ from dataclasses import replace
 from itertools import islice
 from typing import TypeAlias
 
+from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.cluster import Scheduler, connected
 from opencsp_calib.corners import prepare
@@ -62,6 +63,7 @@ def look_at(
     ended = threading.Event()
     with ExitStack() as stack:
         stack.enter_context(opencv_on_one_thread())
+        stack.enter_context(blas_on_one_thread())
         if journal is not None:
             stack.enter_context(journal.open(search.key))
         if scheduler is not None:

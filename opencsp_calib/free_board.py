@@ -3,12 +3,12 @@
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Ids, Mask, Params, Points
 from opencsp_calib.board import Board
 from opencsp_calib.detection import Detection
 from opencsp_calib.models import LensModel
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 
 __all__ = ["laid_on_given", "times_seen", "with_lone_corners"]
 
@@ -53,9 +53,9 @@ def laid_on_given(
     turn = (left * sign) @ right
     scale = float((sizes * sign).sum() / ((points[solved] - found) ** 2).sum())
     laid = scale * (points - found) @ turn.T + wanted
-    before = Rotation.from_rotvec(rotations)
-    after = before * Rotation.from_matrix(turn).inv()
-    return laid, after.as_rotvec(), scale * (translations + before.apply(found)) - after.apply(wanted)
+    before = rotation_matrices(rotations)
+    after = before @ turn.T
+    return laid, rotation_vectors(after), scale * (translations + before @ found) - after @ wanted
 
 
 def with_lone_corners(
@@ -86,7 +86,7 @@ def with_lone_corners(
     placed: Points = points.copy()
     for detection, rotation, translation in zip(detections, rotations, translations, strict=True):
         here = lone[detection.ids]
-        ids, turn = detection.ids[here], Rotation.from_rotvec(rotation).inv()
-        rays, camera = turn.apply(lens.unproject(detection.pixels[here], params)), turn.apply(-translation)
+        ids, turn = detection.ids[here], rotation_matrices(rotation)
+        rays, camera = lens.unproject(detection.pixels[here], params) @ turn, -translation @ turn
         placed[ids] = camera + rays * ((points[ids] - camera) * rays).sum(axis=1, keepdims=True)
     return placed

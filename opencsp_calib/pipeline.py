@@ -12,6 +12,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from opencsp_calib import board_shape as shapes
+from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import Calibration
@@ -178,11 +179,10 @@ def solve(
     def run(views: Observations, chosen: SolveOptions) -> Calibration:
         return engine.solve(views, model, chosen)
 
-    if board_shape == "auto" and "board_free" in engine.abilities:
-        solved = shapes.decide(observations, options, run, aspect_given=pixel_aspect is not None)
-    else:
-        solved = shapes.solve_with_aspect(observations, options, run, aspect_given=pixel_aspect is not None)
-    solved = with_uncertainty(solved)
+    decides = board_shape == "auto" and "board_free" in engine.abilities
+    with blas_on_one_thread():
+        solving = shapes.decide if decides else shapes.solve_with_aspect
+        solved = with_uncertainty(solving(observations, options, run, aspect_given=pixel_aspect is not None))
     return replace(
         solved,
         camera=replace(solved.camera, name=name),

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Matrix, Points, Vector, frozen
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 
 __all__ = ["Pose"]
 
@@ -31,13 +31,12 @@ class Pose:
     @classmethod
     def from_matrix(cls, rotation: Matrix, translation: Vector) -> "Pose":
         """From a rotation matrix (3, 3) and a translation (3,) m."""
-        return cls(Rotation.from_matrix(np.array(rotation)).as_rotvec(), translation)
+        return cls(rotation_vectors(rotation), translation)
 
     @property
     def matrix(self) -> Matrix:
         """(3, 3) rotation matrix."""
-        # a copy, because SciPy asks for a writable buffer
-        return np.asarray(Rotation.from_rotvec(self.rotation.copy()).as_matrix(), dtype=np.float64)
+        return rotation_matrices(self.rotation)
 
     @property
     def tilt_deg(self) -> float:

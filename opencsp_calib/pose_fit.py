@@ -10,7 +10,6 @@ in the noise, the linear solution may be wrong in any way, and a few more starts
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Mask, Matrix, Pixels, Points, Vector
 from opencsp_calib.board import Board
@@ -20,6 +19,7 @@ from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.initial import initial_poses
 from opencsp_calib.pose import Pose
+from opencsp_calib.rotations import rotation_matrices
 
 __all__ = ["fit_pose", "pose_residuals"]
 
@@ -105,10 +105,8 @@ def _tilted(rotation: Matrix, at: Vector) -> tuple[Matrix, ...]:
     normal = rotation[:, 2] * np.sign(rotation[:, 2] @ sight)
     across = np.cross(normal, sight)
     angle = np.arctan2(np.linalg.norm(across), normal @ sight)
-    level = Rotation.from_rotvec(across / max(np.linalg.norm(across), 1e-12) * angle).as_matrix() @ rotation
-    return tuple(
-        Rotation.from_rotvec(sign * TILT * level[:, axis]).as_matrix() @ level for axis in (0, 1) for sign in (1, -1)
-    )
+    level = rotation_matrices(across / max(np.linalg.norm(across), 1e-12) * angle) @ rotation
+    return tuple(rotation_matrices(sign * TILT * level[:, axis]) @ level for axis in (0, 1) for sign in (1, -1))
 
 
 def _perspective_px(points: Points, pixels: Pixels, at: Vector) -> float:
@@ -134,7 +132,7 @@ def _refined(
         cost = _cost(error, used)
         if promised <= max(SMALL_GAIN * cost, used.sum() * EXACT_PX**2) or damping > MAX_DAMPING:
             break
-        new_rotation = Rotation.from_rotvec(step[:3]).as_matrix() @ rotation
+        new_rotation = rotation_matrices(step[:3]) @ rotation
         new_at = at + step[3:]
         new_error = camera.project(points @ new_rotation.T + new_at) - pixels
         both = used & _known(new_error)

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
-from opencsp_calib.arrays import Floats, Matrix, Pixels
+from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.convex_hull import convex_hull, hull_area, within_hull
 from opencsp_calib.detection import Observations
 
 __all__ = ["SetQuality", "ViewQuality", "correlations", "coverage", "set_quality", "view_qualities"]
@@ -98,7 +98,7 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
                 roll_deg=float(np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0]))),
                 orientation="horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical",
                 range_m=float(np.linalg.norm(pose.transform(board_middle[None])[0])),
-                area=_hull_area(view.detection.pixels) / np.prod(calibration.camera.image_size),
+                area=hull_area(convex_hull(view.detection.pixels)) / np.prod(calibration.camera.image_size),
                 edge_width_px=float("nan") if widths is None else float(np.median(widths)),
             )
         )
@@ -127,9 +127,7 @@ def coverage(observations: Observations) -> float:
     cells = np.column_stack([x.ravel(), y.ravel()])
     covered = np.zeros(len(cells), dtype=bool)
     for detection in observations.detections:
-        hull = _hull(detection.pixels)
-        if hull is not None:
-            covered |= (cells @ hull.equations[:, :2].T + hull.equations[:, 2] <= 0).all(axis=1)
+        covered |= within_hull(convex_hull(detection.pixels), cells)
     return float(covered.mean())
 
 
@@ -138,18 +136,6 @@ def correlations(calibration: Calibration) -> Matrix:
     sigma = calibration.sigma
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.asarray(calibration.covariance / np.outer(sigma, sigma), dtype=np.float64)
-
-
-def _hull(pixels: Pixels) -> "ConvexHull | None":
-    try:
-        return ConvexHull(pixels) if len(pixels) >= 3 else None
-    except QhullError:  # all on one line
-        return None
-
-
-def _hull_area(pixels: Pixels) -> float:
-    hull = _hull(pixels)
-    return float(hull.volume) if hull is not None else 0.0  # Qhull's "volume" of a plane figure is its area
 
 
 def _spread(values: list[float]) -> tuple[float, float, float]:

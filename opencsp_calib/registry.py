@@ -1,9 +1,9 @@
 """Which plugins are installed, and what they provide."""
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, cached_property
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any, TypeVar
 
@@ -27,7 +27,7 @@ class Registry:
     ----------
     boards, detectors, solvers, camera_formats, image_sources : mapping of str to the object of that name
     origins : mapping of (str, str) to str
-        For ``("solvers", "bundle")`` and the like, the plugin that provides it.
+        For ``("solvers", "bundle")`` and the like, the plugin that provides it; a format's once it was asked for.
     """
 
     boards: Mapping[str, BoardKind]
@@ -107,10 +107,30 @@ def load(points: Iterable[EntryPoint]) -> Registry:
         boards=_collect(manager, "boards", BoardKind, "board kind", origins),
         detectors=_collect(manager, "detectors", Detector, "detector", origins),
         solvers=_collect(manager, "solvers", Solver, "solver", origins),
-        camera_formats=_collect(manager, "camera_formats", CameraFormat, "camera format", origins),
+        camera_formats=_Later(lambda: _collect(manager, "camera_formats", CameraFormat, "camera format", origins)),
         image_sources=_collect(manager, "image_sources", ImageSource, "image source", origins),
         origins=origins,
     )
+
+
+class _Later(Mapping[str, Any]):
+    """Objects by name that are collected when first asked for: the formats are dozens of modules, seldom needed."""
+
+    def __init__(self, collect: Callable[[], dict[str, Any]]) -> None:
+        self._collect = collect
+
+    @cached_property
+    def _found(self) -> dict[str, Any]:
+        return self._collect()
+
+    def __getitem__(self, name: str) -> Any:
+        return self._found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        return len(self._found)
 
 
 def _collect(

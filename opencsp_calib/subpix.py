@@ -6,7 +6,6 @@ Prefer `opencsp_calib.corners`, which is several times more exact and gives cova
 from dataclasses import replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats, Pixels
 from opencsp_calib.detection import Detection
@@ -53,6 +52,8 @@ def refine_subpix(image: Image, detection: Detection) -> Detection:
 
 def _half_windows(pixels: Pixels, image_size: tuple[int, int]) -> Floats:
     """(n,) whole pixels; 0 where no window fits, since `cornerSubPix` refuses images smaller than its own."""
+    from scipy.spatial import cKDTree
+
     room = (min(image_size) - 6) // 2
     if len(pixels) < 2:
         halves = np.full(len(pixels), float(LARGEST_HALF_WINDOW_PX))

@@ -18,8 +18,6 @@ A projection's uncertainty is what is left after the change of frame that `compa
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.special import stdtrit
 
 from opencsp_calib.arrays import Floats, Matrix, Params
 from opencsp_calib.calibration import Calibration
@@ -124,6 +122,8 @@ def influence(calibration: Calibration) -> tuple[Influence, ...]:
 
 def student_factor(views: int, confidence: float = 0.95) -> float:
     """How many honest sigmas to each side hold the truth with this confidence: Student's t of views - 1 degrees."""
+    from scipy.special import stdtrit
+
     return float(stdtrit(views - 1, 0.5 + 0.5 * confidence))
 
 
@@ -148,8 +148,10 @@ def larger(residual: Matrix, jackknife: Matrix, basis: Matrix) -> Matrix:
     inverse = np.linalg.pinv(basis)
     scale = np.sqrt(np.diag(inverse @ residual @ inverse.T))
     first, second = (inverse @ c @ inverse.T / np.outer(scale, scale) for c in (residual, jackknife))
-    variances, directions = eigh(second, first)  # directions' first directions = 1
-    back = basis @ (scale[:, None] * (first @ directions))
+    root = np.linalg.cholesky(first)
+    whitened = np.linalg.solve(root, np.linalg.solve(root, second).T)
+    variances, directions = np.linalg.eigh((whitened + whitened.T) / 2)
+    back = basis @ (scale[:, None] * (root @ directions))
     return np.asarray(back * np.maximum(variances, 1.0) @ back.T)
 
 

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib.arrays import Floats, Ids, Matrix, Params, Points
 from opencsp_calib.board import Board
@@ -11,6 +10,7 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.models import LensModel
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 
 __all__ = ["Estimate", "Unknowns", "warp_basis"]
 
@@ -40,7 +40,7 @@ class Estimate:
         poses = calibration.cam_from_board
         return cls(
             calibration.camera.params,
-            Rotation.from_rotvec(np.array([p.rotation for p in poses]).reshape(-1, 3)).as_matrix(),
+            rotation_matrices(np.array([p.rotation for p in poses]).reshape(-1, 3)),
             np.array([p.translation for p in poses]).reshape(-1, 3),
             calibration.board.points,
         )
@@ -48,7 +48,7 @@ class Estimate:
     @property
     def poses(self) -> tuple[Pose, ...]:
         """Of each view."""
-        vectors = Rotation.from_matrix(self.rotations).as_rotvec()
+        vectors = rotation_vectors(self.rotations)
         return tuple(Pose(r, t) for r, t in zip(vectors, self.translations, strict=True))
 
     def moved(self, unknowns: "Unknowns", shared: Floats, corner: Floats, pose: Floats) -> "Estimate":
@@ -58,7 +58,7 @@ class Estimate:
         points[unknowns.corners] += corner
         return Estimate(
             self.params + unknowns.camera @ shared[:cameras],
-            np.asarray(Rotation.from_rotvec(pose[:, :3]).as_matrix() @ self.rotations),
+            rotation_matrices(pose[:, :3]) @ self.rotations,
             self.translations + pose[:, 3:],
             points,
         )

@@ -14,9 +14,10 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors",
-    "arrays atomic opencv",
+    "arrays atomic opencv blas",
     "models",
-    "camera pose board",
+    "camera rotations convex_hull board",
+    "pose",
     "image detection options",
     "view_json",
     "calibration",

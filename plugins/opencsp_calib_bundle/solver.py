@@ -6,6 +6,7 @@ import numpy as np
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, SolveOptions
 from opencsp_calib.arrays import Mask
+from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LENS_MODELS, LensModel
 from opencsp_calib.normal_equations import residuals, solvable_corners
@@ -51,13 +52,9 @@ class BundleSolver:
 
         The residual covariance of the camera is filled in; the honest one is for `opencsp_calib.uncertainty`.
         """
-        from threadpoolctl import threadpool_limits
-
         # corners without a covariance are welcome: they count as the typical one of the others
         check_request(self, observations, model, replace(options, weights="equal"))
-        # BLAS threads wait for each other at every block of a factor: where another process has one of the cores, that
-        # takes ten times as long; on idle cores, matrices of this size hardly gain by them
-        with threadpool_limits(limits=1, user_api="blas"):
+        with blas_on_one_thread():
             return self._solved(observations, model, options)
 
     def _solved(self, observations: Observations, model: str, options: SolveOptions) -> Calibration:

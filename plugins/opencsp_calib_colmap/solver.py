@@ -5,13 +5,13 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, Points
 from opencsp_calib.convergence import judged
 from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
 from opencsp_calib.initial import initial_camera, initial_poses
+from opencsp_calib.rotations import rotation_vectors
 from opencsp_calib.solving import check_request, finished
 from opencsp_calib_colmap.cameras import HALF_PIXEL, MODELS, colmap_params, our_params
 
@@ -137,7 +137,7 @@ def _adjust(pycolmap: ModuleType, scene: Any, *, free: bool) -> None:
 def _poses(scene: Any, views: int) -> tuple[Floats, Floats]:
     """(V, 3) rotation vectors and (V, 3) translations, in the order of the views."""
     matrices = np.array([scene.images[number].cam_from_world().matrix() for number in range(1, views + 1)])
-    return Rotation.from_matrix(matrices[:, :, :3]).as_rotvec(), matrices[:, :, 3]
+    return rotation_vectors(matrices[:, :, :3]), matrices[:, :, 3]
 
 
 def _points(scene: Any, count: int) -> Points:

@@ -3,7 +3,6 @@
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, CharucoBoard
@@ -17,6 +16,7 @@ from opencsp_calib_opencv.growth import belongs, filled
 from opencsp_calib_opencv.layout import Layout, laid_out, read_board
 from opencsp_calib_opencv.levels import Level, finest_level
 from opencsp_calib_opencv.markers import cells_of, dictionary_size, found_quads
+from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.saddles import saddle_pixels
 from opencsp_calib_opencv.smoothness import smooth_part
 
@@ -73,7 +73,7 @@ def _corners(level: Level, board: CharucoBoard, layout: Layout) -> Floats:
     """(rows, columns, 2) px of the level."""
     saddles = saddle_pixels(level.grey, most=5000 + 40 * len(board.points))
     there = known(layout.corners)
-    off, nearest = cKDTree(saddles).query(layout.corners[there])
+    off, nearest = (found[:, 0] for found in Neighbours(saddles).nearest(layout.corners[there]))
     grid = np.full_like(layout.corners, np.nan)
     grid[there] = saddles[nearest]
     clear = (1 - board.marker_m / board.spacing_m) / 2

@@ -2,10 +2,10 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats, Mask, Pixels
 from opencsp_calib_opencv.grid import known, mean_known, padded, predicted, square_height, steps, trimmed
+from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.rings import look
 
 __all__ = ["belongs", "filled", "grown", "pruned"]
@@ -39,7 +39,7 @@ def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, longest: int
     Where that comes to an end, one line of corners is passed over: a cable or a finger may hide it. A grid of more than
     `longest` rows or columns is none that is looked for, and grows no further: a tiled floor would take seconds.
     """
-    tree = cKDTree(saddles)
+    tree = Neighbours(saddles)
     for _ in range(MOST_ROUNDS):
         size = known(grid).sum()
         if max(grid.shape[:2]) > longest:
@@ -58,7 +58,7 @@ def filled(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, ring: float
 
     `ring` is the radius, as a part of the squares' height, within which nothing but the checkerboard is printed.
     """
-    tree = cKDTree(saddles)
+    tree = Neighbours(saddles)
     for _ in range(MOST_ROUNDS):
         fuller = _joined(grey, grid, tree, 1, ring)
         if known(fuller).sum() == known(grid).sum():
@@ -67,18 +67,18 @@ def filled(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, ring: float
     return grid
 
 
-def _joined(grey: NDArray[np.float32], grid: Floats, saddles: cKDTree, distance: int, ring: float) -> Floats:
+def _joined(grey: NDArray[np.float32], grid: Floats, saddles: Neighbours, distance: int, ring: float) -> Floats:
     """With the saddles that stand where a corner should be, up to so many steps from the known ones."""
     foretold = grid
     for _ in range(distance):
         foretold = np.where(known(foretold)[..., None], foretold, mean_known(predicted(foretold)))
     empty = ~known(grid) & known(foretold)
-    off, nearest = saddles.query(foretold[empty])
+    off, nearest = (found[:, 0] for found in saddles.nearest(foretold[empty]))
     hit = off < REACH * np.nan_to_num(square_height(foretold)[empty])
     tried = np.zeros_like(empty)
     tried[empty] = hit
     fuller = grid.copy()
-    fuller[tried] = np.asarray(saddles.data)[nearest[hit]]
+    fuller[tried] = saddles.pixels[nearest[hit]]
     fuller[tried & ~belongs(grey, fuller, ring)] = np.nan
     return np.asarray(fuller)
 

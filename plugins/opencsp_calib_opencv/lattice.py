@@ -6,9 +6,9 @@ from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from opencsp_calib.arrays import Floats, Mask
+from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.rings import sample
 from opencsp_calib_opencv.saddles import Saddles
 
@@ -33,7 +33,7 @@ def links(grey: NDArray[np.float32], saddles: Saddles) -> Links:
     found = np.full((n, 4), -1)
     if n < 2:
         return found
-    distance, near = cKDTree(saddles.pixels).query(saddles.pixels, k=min(NEAREST + 1, n))
+    distance, near = Neighbours(saddles.pixels).nearest(saddles.pixels, min(NEAREST + 1, n))
     distance, near = distance[:, 1:], near[:, 1:]
     towards = saddles.pixels[near] - saddles.pixels[:, None]
     angle = np.arctan2(towards[..., 1], towards[..., 0])

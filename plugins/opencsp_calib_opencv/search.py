@@ -1,13 +1,12 @@
 """Looks for grids of corners in one level of a photograph."""
 
-from scipy.spatial import cKDTree
-
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board
 from opencsp_calib_opencv.grid import known, trimmed
 from opencsp_calib_opencv.growth import grown, pruned
 from opencsp_calib_opencv.lattice import grids, links
 from opencsp_calib_opencv.levels import Level
+from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.saddles import corner_like, saddle_pixels
 from opencsp_calib_opencv.smoothness import smooth_part
 
@@ -43,7 +42,7 @@ def found_grids(level: Level, board: Board) -> list[Floats]:
 
 
 def _overlap(grid: Floats, other: Floats) -> bool:
-    distance, _ = cKDTree(other[known(other)]).query(grid[known(grid)])
+    distance, _ = Neighbours(other[known(other)]).nearest(grid[known(grid)])
     return bool((distance < 1).mean() > 0.1)
 
 
