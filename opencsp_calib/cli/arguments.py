@@ -94,7 +94,7 @@ GuessOption = Annotated[
 
 def guess_from(path: Path | None) -> "Camera | None":
     """The camera that ``--guess`` names, in any format we read."""
-    from opencsp_calib.cli.cameras import camera_in
+    from opencsp_calib.cli.camera_files import camera_in
 
     if path is None:
         return None

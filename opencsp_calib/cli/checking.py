@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.cameras import CameraFile, CameraName, ImageSize, calibration_in, camera_in
+from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize, calibration_in, camera_in
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud
 from opencsp_calib.errors import FileFormatError, InputError
