@@ -1,13 +1,30 @@
 """How the documentation is built."""
 
+import sys
 from importlib.metadata import version as version_of
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE / "scripts"))
 
 project = "opencsp-calib"
 author = "The opencsp-calib authors"
 release = version = version_of("opencsp-calib")
-extensions = ["myst_parser"]
-myst_enable_extensions = ["dollarmath"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["deflist", "dollarmath"]
 myst_heading_anchors = 3
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+autodoc_member_order = "bysource"
+autodoc_typehints = "signature"
+default_role = "code"
 html_theme = "furo"
 html_title = f"opencsp-calib {version}"
-exclude_patterns = ["_build"]
+exclude_patterns = ["_build", "example_plugin"]
+
+
+def setup(app: object) -> None:
+    """Write the page of commands from the commands' own help, so that it is never out of date."""
+    from command_page import page
+
+    (HERE / "commands.md").write_text(page(), encoding="utf-8")

@@ -169,3 +169,10 @@ def test_corners_outside_the_image_never_make_it_fail() -> None:
     photograph = Photograph.of(BOARD, camera=small_camera())
     outside = Detection(np.arange(54), photograph.pixels + np.array([600.0, -500.0]))
     assert problems_of(photograph.image, outside, BOARD) is not None
+
+
+def test_corners_that_a_poor_detector_put_in_one_place_never_make_it_fail() -> None:
+    photograph = Photograph.of(BOARD)
+    pixels = photograph.pixels.copy()
+    pixels[20] = pixels[21]
+    assert measured(photograph.image, Detection(np.arange(len(pixels)), pixels), BOARD) is not None

@@ -84,7 +84,8 @@ def _edges(image: Image, grid: Floats, axis: int) -> tuple[Floats, Floats]:
     across[:-1] = grid[1:] - grid[:-1]
     across[-1] = across[-2]
     start, end, beside = grid[:, :-1], grid[:, 1:], across[:, :-1]
-    whole = np.isfinite(start + end + beside).all(axis=2)
+    # a poor detector may put two corners in one place: between them is no edge
+    whole = np.isfinite(start + end + beside).all(axis=2) & (start != end).any(axis=2)
     every = len(start[whole]) // MOST_EDGES + 1
     start, way, beside = start[whole][::every], (end - start)[whole][::every], beside[whole][::every]
     length = np.linalg.norm(way, axis=1)
@@ -140,7 +141,7 @@ def _middles(image: Image, grid: Floats) -> tuple[Floats, Floats, Floats]:
     ups *= np.sign((ups * down).sum(axis=-1, keepdims=True))
     overs = np.stack([-down[..., 1], down[..., 0]], axis=-1)
     overs *= np.sign((overs * on).sum(axis=-1, keepdims=True))
-    known = np.isfinite(lean) & np.isfinite(ups + overs).all(axis=-1)
+    known = np.isfinite(lean) & np.isfinite(ups + overs).all(axis=-1) & ups.any(axis=-1) & overs.any(axis=-1)
     return _unit(ups[known]), _unit(overs[known]), lean[known]
 
 
