@@ -1,17 +1,15 @@
 """From photographs to a calibration: the only place where the parts are put together."""
 
 import os
-import platform
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
-from datetime import datetime, timezone
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from opencsp_calib import board_shape as shapes
+from opencsp_calib import selecting
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
@@ -28,10 +26,22 @@ from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Refine, Search
 from opencsp_calib.models import lens_model
 from opencsp_calib.options import BoardShape, PixelAspect, SolveOptions, Weights
+from opencsp_calib.provenance import made_with
 from opencsp_calib.registry import installed
+from opencsp_calib.selecting import Selection
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["DEFAULT_MODEL", "DEFAULT_SOLVER", "PixelAspect", "board_from", "calibrate", "detect", "places_of", "solve"]
+__all__ = [
+    "DEFAULT_MODEL",
+    "DEFAULT_SOLVER",
+    "PixelAspect",
+    "board_from",
+    "calibrate",
+    "detect",
+    "places_of",
+    "select",
+    "solve",
+]
 
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
@@ -188,7 +198,7 @@ def solve(
         camera=replace(solved.camera, name=name),
         record=record or {},
         provenance={
-            **_versions(),
+            **made_with(),
             "asked": {
                 "model": model,
                 "solver": solver,
@@ -202,13 +212,45 @@ def solve(
     )
 
 
+def select(
+    observations: Observations, count: int, *, progress: Callable[[int, int], None] | None = None, **options: Any
+) -> Selection:
+    """The views that together tell most about the camera, to be solved by these `options` of `solve`.
+
+    Parameters
+    ----------
+    observations : Observations
+    count : int
+        How many.
+    progress : callable, optional
+        Called with the number of views judged, and their total.
+
+    Raises
+    ------
+    InputError
+        If `count` is too small.
+    CalibrationFailedError
+        If no first camera comes out of a few views.
+    """
+
+    def rough(few: Observations) -> Calibration:
+        return solve(few, **{**options, "board_shape": "flat"})
+
+    known = options.get("board_shape") == "flat"
+    return selecting.select(observations, count, rough, board_shape_known=known, progress=progress)
+
+
 def calibrate(
     images: Images, board: Board, model: str = DEFAULT_MODEL, solver: str = DEFAULT_SOLVER, **options: Any
 ) -> Calibration:
-    """Photographs to a calibration: `detect`, then `solve`, whose options it takes by name."""
+    """Photographs to a calibration: `detect`, then `solve`, whose options it takes by name; and ``select=N``."""
     of_detect = {key: options.pop(key) for key in OF_DETECT if key in options}
     options.setdefault("provenance", places_of(images))
-    return solve(detect(images, board, **of_detect), model, solver, **options)
+    count = options.pop("select", None)
+    observations = detect(images, board, **of_detect)
+    if count:
+        observations = select(observations, count, model=model, solver=solver, **options).observations
+    return solve(observations, model, solver, **options)
 
 
 def places_of(images: Images) -> dict[str, Any]:
@@ -253,13 +295,3 @@ def _held_aspect(pixel_aspect: PixelAspect | None) -> float | None:
     if pixel_aspect is None or pixel_aspect == "free":
         return None
     return 1.0 if pixel_aspect == "square" else float(pixel_aspect)
-
-
-def _versions() -> dict[str, Any]:
-    return {
-        "opencsp-calib": version("opencsp-calib"),
-        "python": platform.python_version(),
-        "numpy": version("numpy"),
-        "platform": platform.platform(),
-        "time": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-    }

@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors",
-    "arrays atomic opencv blas",
+    "arrays atomic opencv blas provenance",
     "models",
     "camera rotations convex_hull board",
     "pose",
@@ -26,6 +26,7 @@ TIERS = (
     "quality photograph comparison projection_sigma information uncertainty hdf5 hdf5_calibration opencsp",
     "drawing board_file",
     "synthetic rendering resampling initial pose_fit flatness lens_fit free_board board_shape convergence dropping",
+    "selecting",
     "judgement",
     "summary",
     "interfaces",
