@@ -31,7 +31,7 @@ __all__ = ["CONVERGED", "DIAGNOSTICS", "FAILED", "OUTSIDE", "PARAMETERS", "RAMP_
 PARAMETERS = 11  # x, y, angle of edge 1, of edge 2, s, a, b, gradient of a in x and y, gradient of b
 DIAGNOSTICS = 23
 USUAL_GRADIENT_OF_A, USUAL_GRADIENT_OF_B = 0.02, 0.002  # of b, per px: a lamp's reflection is steep, light is not
-CALM_TURNS = 6  # after which steps that overshoot, back and forth, are halved
+MOST_SWING = 0.5  # of the last step: a step back that is longer has overshot, and from then on steps are halved
 SHARPEST_PX = 0.3  # that a pixel can see, being 0.29 wide itself; what was sharpened afterwards seems sharper
 RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of the window
 
@@ -244,8 +244,9 @@ def _fit(
     step: Floats,
 ) -> tuple[int, int]:
     """Gauss-Newton's method, a step halved until the misfit falls; status and number of pixels."""
-    n, best = 0, math.inf
-    for turn in range(most_steps):
+    n, best, calm = 0, math.inf, 1.0
+    step[:] = 0.0
+    for _ in range(most_steps):
         n = _gather(image, p, window, work)
         if n < 3 * PARAMETERS:
             return OUTSIDE, n
@@ -261,17 +262,19 @@ def _fit(
         _expect(p, misfit, normal)
         if not _factorise(normal, factor):
             return FAILED, n
+        last_x, last_y = step[0], step[1]
         for k in range(len(step)):
             step[k] = normal[PARAMETERS, k]
         _solve(factor, step)
         close = math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance
-        fraction = _trusted_part(p, step)
-        if turn >= CALM_TURNS:
-            fraction *= 0.5
+        if step[0] * last_x + step[1] * last_y < -MOST_SWING * (last_x * last_x + last_y * last_y):
+            calm *= 0.5
+        fraction = calm * _trusted_part(p, step)
         for k in range(len(step)):
             step[k] *= fraction
+        step[4] = max(step[4], SHARPEST_PX - p[4])
+        for k in range(len(step)):
             p[k] += step[k]
-        p[4] = max(p[4], SHARPEST_PX)
         if close:
             return CONVERGED, n
     return FAILED, n
