@@ -9,15 +9,19 @@ import stat
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import TypeAlias
+
+from platformdirs import user_cache_path
 
 __all__ = ["FitCorners", "corner_fit", "prepare"]
 
 FitCorners: TypeAlias = Callable[..., None]
 
 SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, b1, f8[::1], f8[:, ::1])"
+KERNEL = Path(__file__).with_name("corner_kernel")
 
 _log = logging.getLogger(__name__)
 _lock = threading.Lock()
@@ -32,7 +36,7 @@ def prepare() -> None:
 
 
 def corner_fit() -> FitCorners:
-    """`opencsp_calib.corner_kernel.fit_corners`, compiled; waits where another thread is already at it."""
+    """`opencsp_calib.corner_kernel.fitting.fit_corners`, compiled; waits where another thread is already at it."""
     with _lock:
         if not _compiled:
             _compiled.append(_compile())
@@ -40,38 +44,62 @@ def corner_fit() -> FitCorners:
 
 
 def _compile() -> FitCorners:
-    """With a cache where Numba wants it; where that is not writable or damaged, in a folder of ours; else without."""
+    """Kept in the first place that can be written to; without one, for this process only."""
     from numba import njit
 
-    from opencsp_calib.corner_kernel import fit_corners
+    from opencsp_calib.corner_kernel.fitting import fit_corners
 
     def compiled(cache: bool) -> FitCorners:
         fit: FitCorners = njit(SIGNATURE, cache=cache, nogil=True, error_model="numpy")(fit_corners)
         return fit
 
-    for place in (nullcontext, _private_cache):
+    for place in (_beside_the_code, _of_the_user, _private):
         try:
-            with place():
+            with _kept_in(place() / _version()):
                 return compiled(cache=True)
         except Exception as error:  # read-only, full, damaged: no state of the cache may stop the work
             _log.debug("no cache for the compiled fit: %r", error)
     return compiled(cache=False)
 
 
+def _version() -> str:
+    """A name for what the kernel's files say: Numba looks for changes in the file of the outermost function only."""
+    return sha256(b"".join(file.read_bytes() for file in sorted(KERNEL.glob("*.py")))).hexdigest()[:16]
+
+
 @contextmanager
-def _private_cache() -> Iterator[None]:
-    """Have Numba keep its cache in a temporary folder that nobody else can write to: it holds code that will be run."""
+def _kept_in(folder: Path) -> Iterator[None]:
+    """Have Numba keep its cache there; where it cannot write, Numba would silently go elsewhere."""
     from numba import config
 
-    user = os.geteuid() if hasattr(os, "geteuid") else ""
-    folder = Path(tempfile.gettempdir()) / f"opencsp-calib-compiled-{user}"
-    folder.mkdir(mode=0o700, exist_ok=True)
-    found = folder.lstat()
-    if user != "" and (not stat.S_ISDIR(found.st_mode) or found.st_uid != user or found.st_mode & 0o077):
-        raise PermissionError(f"{folder} belongs to somebody else")
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryFile(dir=folder):
+        pass
     usual = config.CACHE_DIR
     config.CACHE_DIR = str(folder)
     try:
         yield
     finally:
         config.CACHE_DIR = usual
+
+
+def _beside_the_code() -> Path:
+    """Where Python keeps what it has compiled; or where Numba is told to."""
+    from numba import config
+
+    return Path(config.CACHE_DIR or KERNEL / "__pycache__")
+
+
+def _of_the_user() -> Path:
+    return user_cache_path("opencsp-calib", appauthor=False)
+
+
+def _private() -> Path:
+    """A temporary folder that nobody else can write to: it holds code that will be run."""
+    user = os.geteuid() if hasattr(os, "geteuid") else ""
+    folder = Path(tempfile.gettempdir()) / f"opencsp-calib-compiled-{user}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    found = folder.lstat()
+    if user != "" and (not stat.S_ISDIR(found.st_mode) or found.st_uid != user or found.st_mode & 0o077):
+        raise PermissionError(f"{folder} belongs to somebody else")
+    return folder

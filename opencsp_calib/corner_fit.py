@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Covariances, Floats, Ids, Mask, Pixels
+from opencsp_calib.corner_kernel.layout import DIAGNOSTICS, PARAMETERS
 
 __all__ = ["CornerFit", "Levels", "begin"]
 
@@ -21,7 +22,7 @@ HIDDEN_BY_SATURATION = 0.12  # of the edge width: what a change of the light mov
 
 @dataclass(frozen=True, eq=False)
 class CornerFit:
-    """The parameters of the image of each corner, and how they were found; see `opencsp_calib.corner_kernel`.
+    """The parameters of the image of each corner, and how they were found; see `opencsp_calib.corner_kernel.fitting`.
 
     Parameters
     ----------
@@ -143,8 +144,6 @@ def begin(image: Levels, pixels: Pixels, vectors: Floats) -> CornerFit:
     vectors : (n, 2, 2) px
         To the next corner along the two edges.
     """
-    from opencsp_calib.corner_kernel import DIAGNOSTICS, PARAMETERS
-
     height, width = image.shape
     far = np.array([-0.4, -0.3, -0.2, 0.2, 0.3, 0.4])
     vectors = np.nan_to_num(vectors)

@@ -7,6 +7,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Mask
 from opencsp_calib.compiled import corner_fit
 from opencsp_calib.corner_fit import CornerFit, Levels
+from opencsp_calib.corner_kernel.layout import DIAGNOSTICS, FAILED, RAMP_PX, WORK_SIZE
 
 __all__ = ["FULL", "NEAR", "SMALL", "Surroundings", "WindowSize"]
 
@@ -25,7 +26,7 @@ class WindowSize:
     largest_px : float
         but at most so many pixels.
     tolerance_px : float
-        The last step is shorter.
+        The last step is shorter; what remains after it is a small part of that.
     """
 
     fraction: float
@@ -34,8 +35,8 @@ class WindowSize:
 
 
 NEAR = WindowSize(0.5, 7.0, 0.03)  # to come near, from 2 px away
-FULL = WindowSize(0.7, 14.0, 0.002)  # neighbours' edges stay outside
-SMALL = WindowSize(0.35, 7.0, 0.002)  # where something disturbs the full one: outer squares of half a width, dirt
+FULL = WindowSize(0.7, 14.0, 0.005)  # neighbours' edges stay outside
+SMALL = WindowSize(0.35, 7.0, 0.005)  # where something disturbs the full one: outer squares of half a width, dirt
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +68,6 @@ class Surroundings:
 
         Not to `examine` leaves out all but where the corners are, and takes two thirds of the time.
         """
-        from opencsp_calib.corner_kernel import DIAGNOSTICS, FAILED, WORK_SIZE
-
         windows = self.windows(start, size)
         chosen = np.flatnonzero(where & np.isfinite(windows[:, 0]))
         parameters = start.parameters[chosen]
@@ -86,8 +85,6 @@ class Surroundings:
 
         Near the image's border windows shrink, so that they stay symmetric about the corner.
         """
-        from opencsp_calib.corner_kernel import RAMP_PX
-
         height, width = self.image.shape
         halves = np.minimum(size.fraction * self.lengths, size.largest_px)
         reach = ((halves + RAMP_PX)[:, :, None] * np.abs(fit.directions)).sum(axis=1)

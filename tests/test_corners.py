@@ -369,7 +369,8 @@ def test_displaced_corners_are_told_by_their_neighbours() -> None:
 
 @pytest.mark.parametrize("second_edge", [0.15 + np.pi / 2, 1.3, -2.2])
 def test_derivatives_are_those_of_the_model(second_edge: float) -> None:
-    from opencsp_calib import corner_kernel as kernel
+    from opencsp_calib.corner_kernel import layout as kernel
+    from opencsp_calib.corner_kernel.image_model import differentiate
 
     grid = np.random.default_rng(1).uniform(-6, 6, (2, 200))
     work = np.zeros(kernel.WORK_SIZE)
@@ -378,7 +379,7 @@ def test_derivatives_are_those_of_the_model(second_edge: float) -> None:
     def columns(p: Floats) -> Floats:
         work[kernel.X : kernel.X + 200] = grid[0] - p[0]
         work[kernel.Y : kernel.Y + 200] = grid[1] - p[1]
-        kernel._differentiate(p, 0.002, -0.001, np.array([100.0, 100.0, np.inf, np.inf]), 200, work)
+        differentiate(p, 0.002, -0.001, np.array([100.0, 100.0, np.inf, np.inf]), 200, work)
         return work[: kernel.RESIDUAL + kernel.STRIDE].reshape(-1, kernel.STRIDE)[:, :200].copy()
 
     analytic = columns(p)
@@ -398,7 +399,7 @@ def test_a_read_only_installation_without_a_home_keeps_its_code_in_a_private_fol
     package = Path(compiled.__file__).parent
     installation = tmp_path / "installation" / "opencsp_calib"
     shutil.copytree(package, installation, ignore=shutil.ignore_patterns("__pycache__", "gui", "report"))
-    (installation / "__pycache__").touch()  # a file, so that not even root can write into it
+    (installation / "corner_kernel" / "__pycache__").touch()  # a file, so that not even root can write into it
     nowhere = os.devnull + "/nowhere"
     places = {
         "PYTHONPATH": str(installation.parent),
@@ -418,11 +419,24 @@ def test_a_read_only_installation_without_a_home_keeps_its_code_in_a_private_fol
     assert kept[0] == kept[1]
 
 
+def test_compiled_code_is_of_what_every_file_of_the_kernel_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kernel = tmp_path / "corner_kernel"
+    shutil.copytree(compiled.KERNEL, kernel, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(compiled, "KERNEL", kernel)
+    versions = {compiled._version()}
+    for file in sorted(kernel.glob("*.py")):
+        file.write_text(file.read_text(encoding="utf-8") + "# changed\n", encoding="utf-8")
+        versions.add(compiled._version())
+    assert len(versions) == 1 + len(list(kernel.glob("*.py")))
+
+
 @pytest.mark.skipif(not hasattr(os, "geteuid"), reason="owners and modes are not kept here")
 def test_a_folder_others_can_write_to_is_not_trusted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiled.tempfile, "gettempdir", lambda: str(tmp_path))
     folder = tmp_path / f"opencsp-calib-compiled-{os.geteuid()}"
     folder.mkdir()
     folder.chmod(0o777)
-    with pytest.raises(PermissionError, match="belongs to somebody else"), compiled._private_cache():
-        pass
+    with pytest.raises(PermissionError, match="belongs to somebody else"):
+        compiled._private()
