@@ -4,6 +4,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,6 +136,14 @@ def test_small_squares(square_px: float, psf_px: float, limit_px: float) -> None
     assert rms(seen.errors(refined)) < limit_px
 
 
+@pytest.mark.parametrize(("square_px", "psf_px"), [(16, 3.0), (24, 3.0), (10, 1.5)])
+def test_blur_that_reaches_the_next_edge_is_stated(square_px: float, psf_px: float) -> None:
+    seen = view(square_px, exposure=Exposure(psf_px=psf_px))
+    refined = refine(seen.image, seen.found(), seen.board)
+    assert len(refined) == len(seen.truth), refined.reason
+    assert 0.6 < seen.squared_over_stated(refined).mean() < 1.5
+
+
 @pytest.mark.parametrize("psf_px", [3.0, 4.0])
 def test_much_blur(psf_px: float) -> None:
     seen = view(44, board=Checkerboard(6, 5, 0.03), exposure=Exposure(psf_px=psf_px))
@@ -168,6 +177,46 @@ def test_strong_shading_and_strong_distortion_do_not_move_corners() -> None:
         refined = refine(seen.image, seen.found(), seen.board)
         assert rms(seen.errors(refined)) < 0.007
         assert seen.squared_over_stated(refined).mean() < 1.4
+
+
+def sharpened(grey: Floats, amount: float) -> Floats:
+    """As cameras and phones do it: what a blur takes away is added."""
+    return np.asarray(grey + amount * (grey - cv2.GaussianBlur(grey, (0, 0), 1.0)))
+
+
+def compressed(grey: Floats, quality: int) -> Floats:
+    pixels = np.clip(np.rint(grey), 0, 255).astype(np.uint8)
+    file = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])[1]
+    return np.asarray(cv2.imdecode(file, cv2.IMREAD_GRAYSCALE), dtype=np.float64)
+
+
+def through_colour_filters(grey: Floats) -> Floats:
+    """Each pixel sees one colour, and the others are filled in from its neighbours."""
+    mosaic = np.clip(np.rint(grey), 0, 255).astype(np.uint8)
+    return np.asarray(cv2.cvtColor(cv2.demosaicing(mosaic, cv2.COLOR_BayerBG2BGR), cv2.COLOR_BGR2GRAY), np.float64)
+
+
+PROCESSED: dict[str, Callable[[Floats], Floats]] = {
+    "compressed": lambda grey: compressed(grey, 75),
+    "compressed much": lambda grey: compressed(grey, 30),
+    "sharpened": lambda grey: sharpened(grey, 2.0),
+    "sharpened and compressed": lambda grey: compressed(sharpened(grey, 1.0), 75),
+    "colour": through_colour_filters,
+    "colour, sharpened, compressed": lambda grey: compressed(sharpened(through_colour_filters(grey), 1.0), 85),
+    "tone curve": lambda grey: 255 * (np.clip(grey, 0, 255) / 255) ** (1 / 2.2),
+    "enlarged": lambda grey: cv2.resize(cv2.resize(grey, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA), SIZE),
+}
+
+
+@pytest.mark.parametrize("name", PROCESSED)
+def test_photographs_that_a_camera_has_processed(name: str) -> None:
+    for square_px, limit_px in ((14, 0.03), (32, 0.02)):
+        seen = view(square_px, exposure=Exposure(noise=3.0))
+        pixels = np.clip(np.rint(PROCESSED[name](seen.image.pixels.astype(np.float64))), 0, 255).astype(np.uint8)
+        refined = refine(Image(name, pixels), seen.found(), seen.board)
+        assert len(refined) == len(seen.truth), refined.reason
+        assert rms(seen.errors(refined)) < limit_px
+        assert seen.squared_over_stated(refined).mean() < 2.5
 
 
 def test_markers_in_the_squares_stay_outside() -> None:
