@@ -36,8 +36,8 @@ class WindowSize:
 
 
 NEAR = WindowSize(0.5, 7.0, 0.03)  # to come near, from 2 px away
-FULL = WindowSize(0.7, 14.0, 0.005)  # neighbours' edges stay outside
-SMALL = WindowSize(0.35, 7.0, 0.005)  # where something disturbs the full one: outer squares of half a width, dirt
+FULL = WindowSize(0.7, 14.0, 0.01)  # neighbours' edges stay outside
+SMALL = WindowSize(0.35, 7.0, 0.01)  # where something disturbs the full one: outer squares of half a width, dirt
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,11 +10,19 @@ from opencsp_calib.corner_kernel.examination import examine_opposites, examine_p
 from opencsp_calib.corner_kernel.image_model import differentiate
 from opencsp_calib.corner_kernel.layout import CONVERGED, FAILED, OUTSIDE, PARAMETERS
 from opencsp_calib.corner_kernel.machine_code import exact
-from opencsp_calib.corner_kernel.normal_matrix import SHARPEST_PX, accumulate, expect, factorise, solve
+from opencsp_calib.corner_kernel.normal_matrix import (
+    SHARPEST_PX,
+    accumulate,
+    expect,
+    factorise,
+    solve,
+    take_from_residuals,
+)
 from opencsp_calib.corner_kernel.window import gather
 
 __all__ = ["fit_corners"]
 
+SETTLED = 0.05  # of the amplitude: grey levels that change by more have not been judged yet
 MOST_SWING = 0.5  # of the last step: a step back that is longer has overshot, and from then on steps are halved
 
 
@@ -55,8 +63,10 @@ def _fit(
         if step[0] * last_x + step[1] * last_y < -MOST_SWING * (last_x * last_x + last_y * last_y):
             calm *= 0.5
         close = math.hypot(step[0], step[1]) < tolerance and abs(step[4]) < 10 * tolerance
+        close &= abs(step[5]) + abs(step[6]) < SETTLED * abs(p[6])
         _take(p, step, calm * _trusted_part(p, step))
         if close:
+            take_from_residuals(work, n, step)
             return CONVERGED, n
     return FAILED, n
 

@@ -3,10 +3,10 @@
 import math
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.corner_kernel.layout import PARAMETERS, STRIDE
+from opencsp_calib.corner_kernel.layout import PARAMETERS, RESIDUAL, STRIDE
 from opencsp_calib.corner_kernel.machine_code import exact, fast
 
-__all__ = ["accumulate", "expect", "factorise", "solve"]
+__all__ = ["accumulate", "expect", "factorise", "solve", "take_from_residuals"]
 
 USUAL_GRADIENT_OF_A, USUAL_GRADIENT_OF_B = 0.02, 0.002  # of b, per px: a lamp's reflection is steep, light is not
 SHARPEST_PX = 0.3  # that a pixel can see, being 0.29 wide itself; what was sharpened afterwards seems sharper
@@ -66,3 +66,11 @@ def solve(factor: Floats, vector: Floats) -> None:
         for k in range(i + 1, len(factor)):
             vector[i] -= factor[k, i] * vector[k]
         vector[i] /= factor[i, i]
+
+
+@fast
+def take_from_residuals(work: Floats, n: int, step: Floats) -> None:
+    """What the residuals are after a short step."""
+    for i in range(len(step)):
+        for k in range(n):
+            work[RESIDUAL + k] -= step[i] * work[i * STRIDE + k]
