@@ -15,6 +15,7 @@ from opencsp_calib.models import LensModel
 from opencsp_calib.normal_equations import NormalEquations, linearise, well_conditioned
 from opencsp_calib.schur import factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
+from opencsp_calib_bundle.extrapolation import extrapolated
 
 __all__ = ["Minimum", "minimise"]
 
@@ -30,6 +31,7 @@ MAX_STEPS = 200
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-4
 LEAST_DAMPING = 1e-16
+VALLEY_STEPS = 30
 POLISHES = 8  # steps below what the cost can show: more are noise, where unknowns can hardly be told apart
 GROWTH = 10.0  # of the damping after a step that fails, then 20, 40 and so on
 
@@ -87,7 +89,43 @@ def minimise(
     # along a curved valley damping must hold back each unknown, not combinations of them that are alike
     near = _descended(lens, table, start, here, NEAR, NEAR)
     combined = linearise(lens, table, near.estimate, well_conditioned(near.equations))
-    return _descended(lens, table, near.estimate, combined, TO_THE_END, LEAST_DAMPING)
+    end = _along_valley(lens, table, near.estimate, combined)
+    return end if end.converged else _descended(lens, table, end.estimate, end.equations, TO_THE_END, LEAST_DAMPING)
+
+
+def _along_valley(lens: LensModel, table: CornerTable, start: Estimate, equations: NormalEquations) -> Minimum:
+    """The last way to a minimum that Newton's steps by JᵀJ alone approach slowly, or swing about; see `extrapolated`.
+
+    Where unknowns can hardly be told apart, the curvature of the residuals is no longer small beside JᵀJ. The place
+    with the least promise left is taken, for the cost is flat to the last digit; never one where it has risen.
+    """
+    try:
+        sigmas = factorise(equations).shared_covariance
+    except np.linalg.LinAlgError:
+        return Minimum(start, equations, converged=False)
+    unknowns, limit = equations.unknowns, equations.cost * (1.0 + ENOUGH)
+    estimate, best, least = start, Minimum(start, equations, converged=False), np.inf
+    walked, steps = [np.zeros(sum(_sizes(equations)))], []
+    for _ in range(VALLEY_STEPS):
+        step = _step(equations, LEAST_DAMPING)
+        if step is None or not equations.cost <= limit:  # NaN is not
+            break
+        if step.promised < least:
+            least = step.promised
+            best = Minimum(estimate, equations, converged=least <= TO_THE_END * equations.cost)
+        if best.converged:
+            break
+        steps.append(np.concatenate([part.ravel() for part in step.parts]))
+        walked.append(extrapolated(walked, steps, sigmas))
+        moved = np.split(walked[-1], np.cumsum(_sizes(equations))[:-1])
+        estimate = start.moved(unknowns, moved[0], moved[1].reshape(-1, 3), moved[2].reshape(-1, 6))
+        with np.errstate(all="ignore"):  # as in `_after`
+            equations = linearise(lens, table, estimate, unknowns)
+    return best
+
+
+def _sizes(equations: NormalEquations) -> tuple[int, int, int]:
+    return equations.unknowns.shared, 3 * len(equations.unknowns.corners), equations.pose_gradient.size
 
 
 def _descended(
