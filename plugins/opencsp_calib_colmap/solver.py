@@ -1,5 +1,7 @@
 """The solver ``colmap``: COLMAP's bundle adjuster, that is Ceres with analytic derivatives, through pycolmap."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
@@ -127,11 +129,23 @@ def _adjust(pycolmap: ModuleType, scene: Any, *, free: bool) -> None:
     solver.parameter_tolerance = SMALLEST_STEP
     solver.num_threads = 1  # with more, sums and so results differ from run to run; and it is hardly quicker
     try:
-        summary = pycolmap.create_default_bundle_adjuster(options, config, scene).solve()
+        with _quiet(pycolmap):
+            summary = pycolmap.create_default_bundle_adjuster(options, config, scene).solve()
     except (RuntimeError, ValueError) as error:
         raise CalibrationFailedError(f"COLMAP failed: {' '.join(str(error).split())}") from error
     if not summary.is_solution_usable():
         raise CalibrationFailedError(f"COLMAP found no solution: {summary.brief_report()}")
+
+
+@contextmanager
+def _quiet(pycolmap: ModuleType) -> Iterator[None]:
+    """Without Ceres' line on the standard error for every step that failed: it goes on, and the end is judged here."""
+    before = pycolmap.logging.minloglevel
+    pycolmap.logging.minloglevel = pycolmap.logging.Level.ERROR.value
+    try:
+        yield
+    finally:
+        pycolmap.logging.minloglevel = before
 
 
 def _poses(scene: Any, views: int) -> tuple[Floats, Floats]:
