@@ -9,8 +9,10 @@ Two estimates, for any solver's result, from the normal equations at its solutio
              Student's t of that many, times sigma (`student_factor`). In the literature of clustered errors this is
              CV3 (Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023).
 
-The honest one, which is shown, saved and used in verdicts, is the larger of the two in every direction of parameter
-space: never below either, and never singular where the jackknife, having fewer views than parameters, is.
+The honest one, which is shown, saved and used in verdicts, is the jackknife. Only where it is below the residual one on
+the whole, in the mean of all directions of parameter space, what it lacks is added as a part of that: few views, or
+exact ones, may all agree by chance. (The larger of the two in every direction would be a third too
+large with 10 views of ideal noise: each direction that chance has made small would be raised, and none lowered.)
 
 A projection's uncertainty is what is left after the change of frame that `compare` fits is projected out.
 """
@@ -94,7 +96,7 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     unknown = _why_unknown(calibration, steps)
     if unknown:
         return calibration.with_problems(unknown)
-    honest = larger(residual, jackknife_covariance(steps), equations.unknowns.camera)
+    honest = honest_covariance(residual, jackknife_covariance(steps), equations.unknowns.camera)
     calibration = replace(calibration, covariance=honest)
     jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
     hangs = _hangs_on(calibration, _influence(calibration, steps, jacobian), jacobian)
@@ -133,10 +135,8 @@ def jackknife_covariance(steps: Floats) -> Matrix:
     return np.asarray((len(steps) - 1) / len(steps) * spread.T @ spread)
 
 
-def larger(residual: Matrix, jackknife: Matrix, basis: Matrix) -> Matrix:
-    """(P, P) the smallest covariance that is below neither of two in any direction.
-
-    With the first made the identity by a change of variables, the second's principal variances are raised to one.
+def honest_covariance(residual: Matrix, jackknife: Matrix, basis: Matrix) -> Matrix:
+    """(P, P) the jackknife, and as much of the residual one as it is smaller in the mean of all directions, if it is.
 
     Parameters
     ----------
@@ -146,13 +146,10 @@ def larger(residual: Matrix, jackknife: Matrix, basis: Matrix) -> Matrix:
         What the parameters may do: fewer columns than rows where fy/fx is held.
     """
     inverse = np.linalg.pinv(basis)
-    scale = np.sqrt(np.diag(inverse @ residual @ inverse.T))
-    first, second = (inverse @ c @ inverse.T / np.outer(scale, scale) for c in (residual, jackknife))
-    root = np.linalg.cholesky(first)
-    whitened = np.linalg.solve(root, np.linalg.solve(root, second).T)
-    variances, directions = np.linalg.eigh((whitened + whitened.T) / 2)
-    back = basis @ (scale[:, None] * (root @ directions))
-    return np.asarray(back * np.maximum(variances, 1.0) @ back.T)
+    first, second = (inverse @ covariance @ inverse.T for covariance in (residual, jackknife))
+    scale = 1.0 / np.sqrt(np.diag(first))  # focal lengths and coefficients differ by orders of magnitude
+    ratio = np.trace(np.linalg.solve(scale[:, None] * first * scale, scale[:, None] * second * scale)) / len(scale)
+    return np.asarray(jackknife + max(0.0, 1.0 - ratio) * residual)
 
 
 def _why_unknown(calibration: Calibration, steps: Floats) -> Problem | None:

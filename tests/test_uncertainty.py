@@ -15,7 +15,13 @@ from opencsp_calib.detection import View
 from opencsp_calib.pipeline import detect
 from opencsp_calib.resampling import leaving_each_out
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses, seed_poses
-from opencsp_calib.uncertainty import influence, jackknife_covariance, larger, student_factor, with_uncertainty
+from opencsp_calib.uncertainty import (
+    honest_covariance,
+    influence,
+    jackknife_covariance,
+    student_factor,
+    with_uncertainty,
+)
 
 BOARD = Checkerboard(9, 6, 0.1)
 CAMERA = demo_camera()
@@ -105,7 +111,7 @@ def test_outliers_count_for_nothing(observations: Observations) -> None:
 
 @settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 10_000), rank=st.integers(0, 6), held=st.booleans())
-def test_the_larger_covariance_is_below_neither_in_any_direction(seed: int, rank: int, held: bool) -> None:
+def test_honest_is_the_jackknife_and_on_the_whole_not_below_the_residual_one(seed: int, rank: int, held: bool) -> None:
     rng = np.random.default_rng(seed)
     basis = np.eye(6)[:, 1:] + np.eye(6)[:, :1] * (np.arange(5) == 0) if held else np.eye(6)
     size = basis.shape[1]
@@ -115,13 +121,21 @@ def test_the_larger_covariance_is_below_neither_in_any_direction(seed: int, rank
         half = basis @ (scale[:, None] * rng.normal(size=(size, rank)))
         return half @ half.T
 
-    first, second = random(size + 3), random(rank)
-    both = larger(first, second, basis)
+    residual, jackknife = random(size + 3), random(rank) * 10.0 ** rng.uniform(-1, 1)
+    honest = honest_covariance(residual, jackknife, basis)
+    inverse = np.linalg.pinv(basis)
+    ratios = [
+        np.linalg.eigvals((inverse @ c @ inverse.T) @ np.linalg.inv(inverse @ residual @ inverse.T)).real.mean()
+        for c in (jackknife, honest)
+    ]
+    assert ratios[1] == pytest.approx(max(1.0, ratios[0]), rel=1e-5)
+    if ratios[0] >= 1.0:
+        assert (honest == jackknife).all()
     directions = rng.normal(size=(50, 6)) / np.maximum(basis @ scale, 1e-9)
-    variances = [np.einsum("ni,ij,nj->n", directions, c, directions) for c in (both, first, second)]
-    assert (variances[0] >= np.maximum(*variances[1:]) * (1 - 1e-6)).all()
+    variances = [np.einsum("ni,ij,nj->n", directions, c, directions) for c in (honest, jackknife)]
+    assert (variances[0] >= variances[1] * (1 - 1e-9)).all()
     if rank == 0:
-        assert both == pytest.approx(first, rel=1e-6, abs=1e-9 * np.abs(first).max())
+        assert honest == pytest.approx(residual)
 
 
 def test_is_honest_where_boards_flex_and_the_residual_sigma_is_not() -> None:
