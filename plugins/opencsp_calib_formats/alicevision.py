@@ -17,10 +17,11 @@ from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
+from opencsp_calib_formats.large_json import IN_PART, read_json
 from opencsp_calib_formats.lens import fov, on_plane
 from opencsp_calib_formats.other_camera import each_camera, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, not_a_result, unverified
-from opencsp_calib_formats.safe_text import MAX_BYTES, head, parse_json, read_text
+from opencsp_calib_formats.safe_text import MAX_BYTES, head
 
 __all__ = ["AliceVision"]
 
@@ -63,16 +64,18 @@ class AliceVision(FileFormat):
     def read(self, path: Path) -> Mapping[str, Imported]:
         """See `CameraFormat.read`; the cameras' names are their intrinsicId."""
         with naming(path):
-            content = Fields(parse_json(read_text(path)))
+            values, in_part = read_json(path, "version", "intrinsics")
+            content = Fields(values)
             version = tuple(int(number) for number in content.numbers("version", 3))
             named = ((str(fields.raw("intrinsicId"))[:40], fields) for fields in content.each("intrinsics"))
-            return each_camera(named, lambda name, fields: _imported(name, fields, version))
+            more = (IN_PART,) if in_part else ()
+            return each_camera(named, lambda name, fields: _imported(name, fields, version, more))
 
 
-def _imported(name: str, fields: Fields, version: Version) -> Imported:
+def _imported(name: str, fields: Fields, version: Version, more: tuple[Problem, ...]) -> Imported:
     size = fields.size("width", "height")
     kind = fields.text("type", "pinhole")
-    notes = _notes(fields, size)
+    notes = _notes(fields, size) + more
     if version > NEWEST:
         known = ".".join(map(str, NEWEST))
         notes += (unverified(f"the file is of a newer version than {known}: read by that one's rules"),)

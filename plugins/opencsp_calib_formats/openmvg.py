@@ -14,9 +14,10 @@ from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.calibio import class_names
 from opencsp_calib_formats.fields import Fields
+from opencsp_calib_formats.large_json import IN_PART, read_json
 from opencsp_calib_formats.other_camera import each_camera
 from opencsp_calib_formats.reading import FileFormat, naming, not_a_result, unverified
-from opencsp_calib_formats.safe_text import head, parse_json, read_text
+from opencsp_calib_formats.safe_text import head
 
 __all__ = ["OpenMvg"]
 
@@ -50,11 +51,11 @@ class OpenMvg(FileFormat):
     def read(self, path: Path) -> Mapping[str, Imported]:
         """See `CameraFormat.read`."""
         with naming(path):
-            content = Fields(parse_json(read_text(path)))
+            values, in_part = read_json(path, "intrinsics", "extrinsics")
+            content = Fields(values)
             entries = content.each("intrinsics")
-            notes = (
-                (HALF_PIXEL,) if content.first("extrinsics") and content.raw("extrinsics") else (HALF_PIXEL, UNSOLVED)
-            )
+            solved = in_part or bool(content.values.get("extrinsics"))  # their end may not have been read
+            notes = (HALF_PIXEL, *(() if solved else (UNSOLVED,)), *((IN_PART,) if in_part else ()))
             objects = [entry.fields("value") for entry in entries]
             keys = [str(entry.raw("key"))[:40] for entry in entries]
             named = zip(keys, zip(objects, class_names(objects), strict=True), strict=True)

@@ -18,11 +18,12 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
+from opencsp_calib_formats.large_json import IN_PART, read_json
 from opencsp_calib_formats.lens import brown, equidistant
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
 from opencsp_calib_formats.reading import TextFormat, naming, not_a_result
-from opencsp_calib_formats.safe_text import MAX_BYTES, head, parse_json, read_text
+from opencsp_calib_formats.safe_text import MAX_BYTES, head
 
 __all__ = ["OpenSfM"]
 
@@ -60,9 +61,10 @@ class OpenSfM(TextFormat):
     def read(self, path: Path) -> Mapping[str, Imported]:
         """See `CameraFormat.read`; of several reconstructions, all cameras."""
         with naming(path):
-            content = parse_json(read_text(path))
+            content, in_part = read_json(path, "cameras")
             found, guess = _cameras(content)
-            notes = (not_a_result(GUESS),) if guess or path.name == "camera_models.json" else ()
+            guess = guess or path.name == "camera_models.json"
+            notes = (*((not_a_result(GUESS),) if guess else ()), *((IN_PART,) if in_part else ()))
             return each_camera(found, lambda name, fields: _imported(name, fields, notes))
 
     def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:

@@ -85,6 +85,8 @@ def _cameras(content: Fields) -> Iterator[tuple[str, dict[str, Any]]]:
 def _imported(name: str, fields: Fields) -> Imported:
     size = fields.size("w", "h") if fields.first("w", "h") else None
     model = fields.text("camera_model", FISHEYE if fields.flag("is_fisheye") else "OPENCV").upper()
+    if fields.flag("is_fisheye") and model in PERSPECTIVE:
+        raise FileFormatError(f"{name} is {model} and is_fisheye, which contradict each other")
     other = [lens for lens in OTHER_LENSES if fields.values.get(lens) not in (None, False)]
     if other or model not in (*PERSPECTIVE, FISHEYE):
         return not_exactly((f"camera model {', '.join(other) or model} (no lens model of ours)",), None, size)

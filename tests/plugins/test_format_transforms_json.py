@@ -102,3 +102,10 @@ def test_opencvs_own_k4_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="k4"):
         TransformsJson().write({"x": camera}, tmp_path / "transforms.json")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fisheye_that_is_said_to_be_perspective_is_neither(tmp_path: Path) -> None:
+    path = tmp_path / "transforms.json"
+    path.write_text('{"camera_model": "OPENCV", "is_fisheye": true, "fl_x": 500, "cx": 5, "cy": 4, "w": 10, "h": 8}')
+    with pytest.raises(FileFormatError, match="contradict"):
+        TransformsJson().read(path)
