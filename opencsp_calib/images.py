@@ -10,7 +10,7 @@ import os
 import re
 import stat
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,7 @@ __all__ = [
     "natural_order",
     "read_encoded",
     "read_image",
+    "reduced",
     "undistort",
     "write_image",
 ]
@@ -223,6 +224,14 @@ def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:
         raise InputError(f"cannot write {path}: not an image of 8 or 16 bits")
     with replacing(path) as temporary:
         temporary.write_bytes(data.tobytes())
+
+
+def reduced(image: Image, n: int) -> Image:
+    """The image with n x n pixels averaged into one: (x, y) becomes ``(x + 1/2)/n - 1/2``; what is over is left out."""
+    width, height = (side // n for side in image.size)
+    whole = image.pixels[: height * n, : width * n]
+    small = whole if n == 1 else opencv().resize(whole, (width, height), interpolation=opencv().INTER_AREA)
+    return replace(image, pixels=small)
 
 
 def encode_thumbnail(pixels: NDArray[Any], side: int) -> bytes:

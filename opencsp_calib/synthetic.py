@@ -15,7 +15,7 @@ from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import InputError
 from opencsp_calib.pose import Pose
 
-__all__ = ["bowed", "demo_camera", "observe", "outline", "pose_in_view", "random_poses", "seed_poses"]
+__all__ = ["bowed", "demo_camera", "observe", "outline", "pose_in_view", "random_poses", "seed_poses", "turned"]
 
 BORDER_PX = 4.0  # between the board's outline and the image's edge: a corner at the very edge cannot be localised
 MAX_STEPS = 200
@@ -116,7 +116,7 @@ def seed_poses(board: Board, camera: Camera, views: int = 50, rng: np.random.Gen
         azimuth = 2.0 * np.pi * (view * (np.sqrt(5.0) - 1.0) / 2.0 + rng.uniform(-0.03, 0.03))
         tilt = np.deg2rad(rng.uniform(30.0, 45.0))
         fill = rng.uniform(0.6, 0.9)
-        poses.append(pose_in_view(board, camera, _turned(tilt, azimuth, roll), fill, places[view]))
+        poses.append(pose_in_view(board, camera, turned(tilt, azimuth, roll), fill, places[view]))
     return tuple(poses)
 
 
@@ -155,7 +155,7 @@ def random_poses(
     poses = []
     for _ in range(views):
         tilt, roll = np.deg2rad(rng.uniform(*tilt_deg)), np.deg2rad(rng.uniform(*roll_deg))
-        rotation = _turned(tilt, rng.uniform(0.0, 2.0 * np.pi), roll)
+        rotation = turned(tilt, rng.uniform(0.0, 2.0 * np.pi), roll)
         place = (rng.uniform(), rng.uniform())
         poses.append(pose_in_view(board, camera, rotation, rng.uniform(*fill), place))
     return tuple(poses)
@@ -218,7 +218,7 @@ def _view(name: str, pixels: Floats, camera: Camera, noise_px: float) -> View:
     return View(name, Detection(ids, pixels[ids], covariance), "used")
 
 
-def _turned(tilt_rad: float, azimuth_rad: float, roll_rad: float) -> Matrix:
+def turned(tilt_rad: float, azimuth_rad: float, roll_rad: float) -> Matrix:
     """Rolled in its own plane, then tilted about an axis across the line of sight."""
     tilt = Rotation.from_rotvec(tilt_rad * np.array([np.cos(azimuth_rad), np.sin(azimuth_rad), 0.0]))
     return np.asarray((tilt * Rotation.from_rotvec([0.0, 0.0, roll_rad])).as_matrix(), dtype=np.float64)

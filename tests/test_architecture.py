@@ -37,6 +37,7 @@ TIERS = (
     "detecting",
     "pipeline demo",
     "trials validate check coach fleet",
+    "capture",
     "report",
     "cli gui",
     "__main__",

@@ -10,7 +10,7 @@ import warnings
 
 import typer
 
-from opencsp_calib.cli import calibrating, cameras, checking, converting, setting_up, window
+from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, setting_up, window
 from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.setting_up import print_versions
 from opencsp_calib.errors import CalibError

@@ -1,0 +1,15 @@
+"""Taking photographs for a calibration: from a source of images, at the right moments, into a folder, losing none.
+
+::
+
+    folder.py     the photographs on disk, each with its record; goes on where it was stopped
+    release.py    when the shutter is released: by the coach, by a clock, by hand
+    learner.py    works out in the background what the photographs tell
+    capture.py    puts these together: frame in, state out; the command line and the GUI show it
+"""
+
+from opencsp_calib.capture.capture import Capture, State
+from opencsp_calib.capture.folder import CaptureFolder
+from opencsp_calib.capture.release import Release, release_from
+
+__all__ = ["Capture", "CaptureFolder", "Release", "State", "release_from"]

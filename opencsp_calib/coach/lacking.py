@@ -1,0 +1,134 @@
+"""What a set of views still needs by the seed's procedure, in words, and which further view would help."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from opencsp_calib.arrays import Pixels
+from opencsp_calib.board import Board
+from opencsp_calib.camera import Camera
+from opencsp_calib.detection import Observations
+from opencsp_calib.pose import Pose
+
+__all__ = ["FEW_VIEWS", "REGIONS", "TILT_ALLOWED_DEG", "Lack", "held", "lacks", "range_of"]
+
+FEW_VIEWS = 10
+TILT_ALLOWED_DEG = (25.0, 50.0)  # 30 to 45 are asked for; a person does not hold a board to a degree
+REACH = 0.2  # of the image's width and height: corners of the board this near to an edge reach it
+LEAST_OF_EACH = 0.3  # of the views, held each way; the procedure asks for half
+RANGE_SPREAD = 1.1
+NEAR_FAR = 1.15  # times the middle range: a view this much nearer or farther spreads them
+
+REGIONS = {
+    (column, row): " ".join(name for name in (vertical, horizontal) if name) or "middle"
+    for row, vertical in enumerate(("upper", "", "lower"))
+    for column, horizontal in enumerate(("left", "", "right"))
+}
+"""Names of the image's nine regions, by column and row."""
+
+
+@dataclass(frozen=True)
+class Lack:
+    """Something that the set still needs.
+
+    Parameters
+    ----------
+    code : str
+        Short, stable: ``views``, ``tilt``, ``orientation``, ``coverage``, ``range``.
+    message : str
+        For the person who holds the board.
+    helped_by : callable
+        Whether a view of the board in a pose would help: takes camera, board, pose.
+    """
+
+    code: str
+    message: str
+    helped_by: Callable[[Camera, Board, Pose], bool] = field(repr=False, compare=False)
+
+
+def lacks(observations: Observations, poses: Sequence[Pose]) -> tuple[Lack, ...]:
+    """What views, with the poses of the board in them, still lack."""
+    board = observations.board
+    found = [
+        _views(len(poses)),
+        _tilt(poses),
+        _orientation(board, poses),
+        _coverage(observations),
+        _range(board, poses),
+    ]
+    return tuple(lack for lack in found if lack is not None)
+
+
+def held(board: Board, pose: Pose) -> str:
+    """``horizontal`` or ``vertical``: how the board's longer side runs in the image."""
+    columns, rows = board.grid
+    longer = pose.matrix[:, 0] if columns >= rows else pose.matrix[:, 1]
+    return "horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical"
+
+
+def range_of(board: Board, pose: Pose) -> float:
+    """From the camera to the middle of the board, metres."""
+    return float(np.linalg.norm(pose.transform(board.points.mean(axis=0)[None])[0]))
+
+
+def _views(count: int) -> Lack | None:
+    if count >= FEW_VIEWS:
+        return None
+    return Lack("views", f"{FEW_VIEWS - count} more views at least", lambda *_: False)
+
+
+def _tilt(poses: Sequence[Pose]) -> Lack | None:
+    low, high = TILT_ALLOWED_DEG
+    good = sum(low <= pose.tilt_deg <= high for pose in poses)
+    if poses and good >= len(poses) / 2:
+        return None
+    message = f"tilt by 30 to 45 degrees: {good} of {len(poses)} views have that"
+    return Lack("tilt", message, lambda _, __, pose: low <= pose.tilt_deg <= high)
+
+
+def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
+    ways = [held(board, pose) for pose in poses]
+    counts = {way: ways.count(way) for way in ("horizontal", "vertical")}
+    rarer = min(counts, key=lambda way: counts[way])
+    if poses and counts[rarer] >= LEAST_OF_EACH * len(poses):
+        return None
+    message = f"hold the board {rarer}: {counts['horizontal']} views are horizontal, {counts['vertical']} vertical"
+    return Lack("orientation", message, lambda _, board, pose: held(board, pose) == rarer)
+
+
+def _coverage(observations: Observations) -> Lack | None:
+    reached: set[tuple[int, int]] = set()
+    for detection in observations.detections:
+        reached |= _reached(detection.pixels, observations.image_size)
+    missing = [where for where in REGIONS if where not in reached]
+    if not missing:
+        return None
+    names = ", ".join(REGIONS[where] for where in missing)
+
+    def helps(camera: Camera, board: Board, pose: Pose) -> bool:
+        pixels = camera.project(pose.transform(board.points))
+        return not _reached(pixels, camera.image_size).isdisjoint(missing)
+
+    return Lack("coverage", f"bring the board to where none was in the image: {names}", helps)
+
+
+def _reached(pixels: Pixels, image_size: tuple[int, int]) -> set[tuple[int, int]]:
+    """The regions that corners lie in: the four ends of the image, a strip along each edge, and the middle."""
+    inside = pixels[np.isfinite(pixels).all(axis=1)]
+    places = np.digitize(inside / np.array(image_size), [REACH, 1.0 - REACH])
+    return {(int(column), int(row)) for column, row in np.unique(places, axis=0)}
+
+
+def _range(board: Board, poses: Sequence[Pose]) -> Lack | None:
+    ranges = [range_of(board, pose) for pose in poses]
+    if ranges and max(ranges) > RANGE_SPREAD * min(ranges):
+        return None
+    message = f"go nearer or farther: all views are {min(ranges):.2f} m away" if ranges else "views from two distances"
+    middle = float(np.median(ranges)) if ranges else float("nan")
+
+    def helps(_: Camera, board: Board, pose: Pose) -> bool:
+        ratio = range_of(board, pose) / middle
+        return not 1 / NEAR_FAR < ratio < NEAR_FAR
+
+    return Lack("range", message, helps)
