@@ -43,11 +43,6 @@ class Pose:
         """Between the board's normal and the optical axis: 0 is head-on."""
         return float(np.degrees(np.arccos(min(1.0, abs(self.matrix[2, 2])))))
 
-    @property
-    def tilt_deg(self) -> float:
-        """Between the board's normal and the optical axis: 0 is head-on."""
-        return float(np.degrees(np.arccos(min(1.0, abs(self.matrix[2, 2])))))
-
     def transform(self, points: Points) -> Points:
         """(N, 3) m board points in the camera's frame."""
         return np.asarray(points @ self.matrix.T + self.translation, dtype=np.float64)

@@ -25,7 +25,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (calibrating, cameras, converting, checking, setting_up, window):
+for module in (calibrating, cameras, capturing, converting, checking, setting_up, window):
     for command in module.COMMANDS:
         app.command()(command)
 
