@@ -2,14 +2,14 @@
 
 Claim
     A camera that came from another program's file projects every point to where that program projects it, to 1e-9 px,
-    once the program's pixel origin is taken into account: the centre of the upper-left pixel is (0, 0) for OpenCV, mrcal
-    and us, (0.5, 0.5) for COLMAP and Metashape, (1, 1) for MATLAB. Half a pixel wrong is not within it.
+    once the program's pixel origin is taken into account: the centre of the upper-left pixel is (0, 0) for OpenCV,
+    mrcal, OpenSfM and us, (0.5, 0.5) for COLMAP and Metashape, (1, 1) for MATLAB. Half a pixel wrong is not within it.
 
 Way
-    OpenCV, COLMAP (pycolmap) and mrcal project 500 random points themselves; the file is written by the program where it
-    can (OpenCV's FileStorage, COLMAP's text), else by us and read by it (mrcal). MATLAB, Metashape and OpenSfM, which
-    cannot run here, are the formulas of their manuals, written down in this file and nowhere else. "Worst" is the largest
-    distance in pixels; "if wrong by half" what it would be with half a pixel mistaken.
+    OpenCV, COLMAP (pycolmap) and mrcal project 500 random points themselves; the file is written by the program where
+    it can (OpenCV's FileStorage, COLMAP's text), else by us and read by it (mrcal). MATLAB, Metashape and OpenSfM,
+    which cannot run here, are the formulas of their manuals, written down in this file. "Worst" is the largest distance
+    in pixels; "if wrong by half" what it would be with half a pixel mistaken.
 
 Run ``python validation/bench.py conventions``.
 """
