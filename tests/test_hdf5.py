@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import opencsp_as_described
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -40,14 +41,7 @@ def camera_of(model: str) -> Camera:
 
 
 def as_opencsp_loads(path: Path) -> dict:
-    """Written from the description of OpenCSP's hdf5_tools: squeeze arrays, flatten single values, decode bytes."""
-    loaded = {}
-    with h5py.File(path, "r") as file:
-        for name in ("intrinsic_mat", "distortion_coef", "image_shape_xy", "name"):
-            data = file[f"Camera/{name}"]
-            value = data[()] if data.ndim == 0 else data[...].flatten()[0] if data.size == 1 else data[...].squeeze()
-            loaded[name] = value.decode() if isinstance(value, bytes) else value
-    return loaded
+    return vars(opencsp_as_described.Camera.load_from_hdf(path))
 
 
 @pytest.mark.parametrize("model", LENS_MODELS)

@@ -1,8 +1,8 @@
 """Run studies, and keep what they found in ``validation/results/``.
 
 ``python validation/bench.py`` runs all, ``python validation/bench.py corners bundle_speed`` those. A study is a script
-here whose docstring has a title, what it claims, and its way, and which prints its figures. Its result is a page: title,
-claim, way and whatever a person wrote below them stay as they are; what follows the line ``## Figures`` is replaced.
+here whose docstring has a title, what it claims, and its way, and which prints its figures. Its result is a page:
+title, claim, way and whatever a person wrote below them stay; what follows the line ``## Figures`` is replaced.
 """
 
 import os

@@ -1,0 +1,98 @@
+"""Speed and memory of solving, against the seed's way, at 10 to 2000 views.
+
+Claim
+    Solving takes about as long as OpenCV's ``calibrateCamera``, which the seed calls, and is linear in the number of
+    views in time and memory. The whole of ``solve`` with its defaults, which decides on the board's shape and leaves
+    out each view in turn for an honest uncertainty, takes some ten times as long.
+
+Way
+    The seed's procedure (demo camera, 21 x 18 corners, half of the views turned), corners made with noise of 0.1 px.
+    Each cell is a process of its own: seconds of the call alone (`Solver.solve` with a flat board and equal weights;
+    the whole of `opencsp_calib.solve`; `cv2.calibrateCamera`, four coefficients), and by how many MB its peak memory is
+    above what it was before the call. Ratios are to OpenCV's time in the same row. With an argument, another Python
+    (with the OpenCV 4.9 that OpenCSP pins) runs its ``calibrateCamera``, too.
+
+Run ``python validation/seeds_way.py [PYTHON WITH OPENCV 4.9]``.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from opencsp_calib import Checkerboard
+from opencsp_calib.synthetic import demo_camera, observe, seed_poses
+
+VIEWS = (10, 50, 200, 1000, 2000)
+PINNED_VIEWS = 200  # OpenCV 4.9 grows with the cube of the views: 22 s for these
+BOARD = Checkerboard(21, 18, 0.05)
+NOISE_PX = 0.1
+MEASURED = """
+import json, resource, sys, time
+import numpy as np
+data = np.load(sys.argv[1])
+{prepare}
+def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+before, start = peak(), time.perf_counter()
+{call}
+print(json.dumps([time.perf_counter() - start, peak() - before]))
+"""
+AS_LISTS = """
+import cv2
+points = [data['points'].astype(np.float32)] * len(data['pixels'])
+pixels = list(data['pixels'].astype(np.float32))
+"""
+SEEDS = (
+    AS_LISTS,
+    "cv2.calibrateCamera(points, pixels, (1626, 1236), None, np.zeros(4), flags=cv2.CALIB_FIX_K3)",
+)
+OBSERVED = """
+from opencsp_calib import Checkerboard, Detection, Observations, SolveOptions, View, solve
+from opencsp_calib.registry import installed
+ids, solver = np.arange(len(data['points'])), installed().solver('bundle')
+def seen(count):
+    found = [Detection(ids, p, np.tile(0.01 * np.eye(2), (len(p), 1, 1))) for p in data['pixels'][:count]]
+    views = tuple(View(str(number), detection, 'used') for number, detection in enumerate(found))
+    return Observations(Checkerboard(21, 18, 0.05), (1626, 1236), views)
+views, few = seen(None), seen(5)
+"""
+WAYS = {
+    "calibrateCamera": SEEDS,
+    "bundle": (
+        OBSERVED + "solver.solve(few, 'opencv4', SolveOptions())",
+        "solver.solve(views, 'opencv4', SolveOptions())",
+    ),
+    "solve, all of it": (OBSERVED + "solve(few)", "solve(views)"),
+}
+
+
+def measured(python: str, way: tuple[str, str], data: Path) -> tuple[float, float]:
+    """Seconds, and MB above what there was before."""
+    source = MEASURED.format(prepare=way[0], call=way[1])
+    done = subprocess.run([python, "-c", source, data], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    seconds, megabytes = json.loads(done.stdout)
+    return seconds, megabytes
+
+
+def main() -> None:
+    """Print the table."""
+    pinned = sys.argv[1:2]
+    names = [*WAYS, *(["calibrateCamera of OpenCV 4.9"] if pinned else [])]
+    print(f"| views | {' | '.join(f'{name}: s (ratio), MB' for name in names)} |\n{'|---' * (1 + len(names))}|")
+    camera = demo_camera()
+    with tempfile.TemporaryDirectory() as folder:
+        for views in VIEWS:
+            observations = observe(camera, BOARD, seed_poses(BOARD, camera, views), noise_px=NOISE_PX)
+            data = Path(folder) / f"{views}.npz"
+            np.savez(data, points=BOARD.points, pixels=np.array([d.pixels for d in observations.detections]))
+            found = [measured(sys.executable, way, data) for way in WAYS.values()]
+            found += [measured(pinned[0], SEEDS, data)] if pinned and views <= PINNED_VIEWS else []
+            cells = [f"{s:.2f} ({s / found[0][0]:.1f}), {mb:.0f}" for s, mb in found]
+            print(f"| {views} | {' | '.join(cells + [''] * (len(names) - len(cells)))} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()
