@@ -3,15 +3,11 @@
 It goes into an environment of its own, made for the test, which borrows the packages of this one.
 """
 
-import json
-import os
 import shutil
-import subprocess
-import sys
-import venv
 from pathlib import Path
 
 import pytest
+from environments import Environment
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "docs" / "example_plugin"
 BROKEN = """
@@ -26,35 +22,6 @@ broken = "broken_plugin"
 [tool.hatch.build.targets.wheel]
 only-include = ["broken_plugin.py"]
 """
-
-
-class Environment:
-    """A throw-away environment that pip of this one installs into, without asking the network for anything."""
-
-    def __init__(self, folder: Path) -> None:
-        venv.create(folder, with_pip=False)
-        self.python = str(next(folder.glob("[bS]*/python*")))
-        borrowed = "\n".join(path for path in sys.path if path and Path(path).is_dir())
-        site = self.run("-c", "import sysconfig; print(sysconfig.get_path('purelib'))").stdout.strip()
-        (Path(site) / "borrowed.pth").write_text(borrowed)
-
-    def run(self, *arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
-        kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COV"))}
-        done = subprocess.run([self.python, *arguments], capture_output=True, text=True, timeout=250, env=kept)
-        assert done.returncode == code, done.stdout + done.stderr
-        return done
-
-    def pip(self, *arguments: str) -> None:
-        command = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", self.python]
-        done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=250)
-        assert done.returncode == 0, done.stderr
-
-    def install(self, project: Path) -> None:
-        self.pip("install", "--no-index", "--no-deps", "--no-build-isolation", str(project))
-
-    def plugins(self) -> set[tuple[str, str]]:
-        listed = json.loads(self.run("-m", "opencsp_calib", "plugins", "--json").stdout)
-        return {(entry["kind"], entry["name"]) for entry in listed}
 
 
 @pytest.fixture
