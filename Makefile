@@ -3,13 +3,16 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs bench oldest clean help
+.PHONY: demo test lint docs bench pictures mutants coverage release clean help
 
 help:
 	@echo "make demo   render photographs, calibrate, write demo/camera.h5 and demo/report.html"
 	@echo "make test   lint, type-check and test everything"
 	@echo "make docs   build the documentation into docs/_build"
 	@echo "make bench  run the studies in validation/"
+	@echo "make mutants, coverage   how well the tests test"
+	@echo "make pictures   draw the pictures of the documentation again"
+	@echo "make release   build wheel and sdist, and try the wheel in a clean environment"
 
 demo: $(VENV)/.core
 	$(BIN)/opencsp-calib demo demo
@@ -26,7 +29,29 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W -q -b html docs docs/_build
 
 bench: $(VENV)/.dev
-	set -e; for study in validation/[a-z]*.py; do echo "== $$study"; $(BIN)/python $$study; done
+	$(BIN)/python validation/bench.py
+
+pictures: $(VENV)/.dev
+	for script in photographs lens_models screenshots; do $(BIN)/python docs/scripts/$$script.py; done
+
+# One change to the code at a time: does a test notice? Hours; apart from make test.
+mutants: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group mutants
+	$(BIN)/python -m mutmut run
+	$(BIN)/python -m mutmut results
+
+coverage: $(VENV)/.dev
+	$(BIN)/python -m pytest -n 2 --cov=opencsp_calib --cov-report=term-missing:skip-covered --cov-fail-under=95
+
+# Wheel and sdist into dist/, and the wheel with all its extras at work in a clean environment.
+release: $(VENV)/.dev
+	rm -rf dist .venv-release
+	$(BIN)/python -m hatchling build --directory dist
+	$(PYTHON) -m venv .venv-release
+	.venv-release/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[all]"
+	cd dist && ../.venv-release/bin/opencsp-calib --version && ../.venv-release/bin/opencsp-calib plugins
+	cd dist && ../.venv-release/bin/opencsp-calib demo demo --views 10
+	rm -rf .venv-release dist/demo
 
 # What users of the main job install; quick when it is there.
 $(VENV)/.core: pyproject.toml

@@ -24,7 +24,9 @@ exclude_patterns = ["_build", "example_plugin"]
 
 
 def setup(app: object) -> None:
-    """Write the page of commands from the commands' own help, so that it is never out of date."""
-    from command_page import page
+    """Write the pages that are made from what they are about, so that they are never out of date."""
+    import command_page
+    import studies_page
 
-    (HERE / "commands.md").write_text(page(), encoding="utf-8")
+    for name, page in (("commands", command_page.page), ("studies", studies_page.page)):
+        (HERE / f"{name}.md").write_text(page(), encoding="utf-8")

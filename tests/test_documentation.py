@@ -27,7 +27,7 @@ from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import seed_poses
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATED = {"commands.md"}
+GENERATED = {"commands.md", "studies.md"}
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 PAGES += [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in GENERATED]
 SHORTER = {
@@ -172,6 +172,20 @@ def test_the_page_of_commands_is_the_commands_own_help(monkeypatch: pytest.Monke
 def test_every_command_is_in_the_readme() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
     assert [name for name in typer.main.get_command(cli.app).commands if f"`{name}`" not in text] == []
+
+
+def test_every_study_has_a_claim_and_every_result_its_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "validation")
+    import bench
+
+    for study in bench.studies().values():
+        assert bench.head_of(study)
+    for result in bench.RESULTS.glob("*.md"):
+        head, figures, found = result.read_text(encoding="utf-8").partition(bench.FIGURES)
+        assert re.match(r"# .*\*\*Claim\.\*\* .*\*\*Way\.\*\* ", head, re.DOTALL), result.name
+        assert figures, result.name
+        assert re.match(r"\n20[0-9-]{8}, ", found), f"{result.name}: when, and on what?"
+        assert result.stem in bench.studies(), f"{result.name} is of no study"
 
 
 def test_every_lens_model_has_a_figure() -> None:

@@ -10,7 +10,7 @@ Way
     and noise. "Seed's way" is OpenCV's solver on the corners of the same photographs with OpenCV's sub-pixel search.
     Shape: distance of solved corners from true ones after a similarity, rms.
 
-Run ``python validation/bundle_bowed_board.py > validation/results/bundle_bowed_board.md``.
+Run ``python validation/bundle_bowed_board.py``.
 """
 
 import tempfile
@@ -69,7 +69,6 @@ def row(world: str, way: str, calibration: Calibration, bow_m: float) -> str:
 
 def main() -> None:
     """Print the table."""
-    print(__doc__.split("\n\nRun")[0])
     print("\nErrors of fx, fy, cx, cy with their honest sigmas; worst difference by projection, frames aligned.\n")
     print("| world | way | rms px | fx | fy | cx | cy | worst px | shape mm |\n|---|---|---|---|---|---|---|---|---|")
     for seed in range(1, WORLDS + 1):

@@ -11,7 +11,7 @@ Way
     residuals', so that it is the Cramér-Rao bound; "cost" is errors free over flat, and its bound likewise.
     Projections: over the image (40 x 30 points), after the change of frame that fits best, rms over points.
 
-Run ``python validation/bundle_flat_board.py > validation/results/bundle_flat_board.md``.
+Run ``python validation/bundle_flat_board.py``.
 """
 
 import sys
@@ -46,7 +46,6 @@ def errors_and_bounds(calibration: Calibration) -> tuple[Floats, Floats]:
 
 def main() -> None:
     """Print the table."""
-    print(__doc__.split("\n\nRun")[0])
     solver = installed().solver("bundle")
     print("\n| views | what | error flat | bound flat | error free | bound free | cost | its bound | ratio |")
     print("|---|---|---|---|---|---|---|---|---|")

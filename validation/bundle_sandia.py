@@ -11,7 +11,7 @@ Way
     Spacing: the board's in y over that in x, as solved; shear: how far its axes are from square; both from the affine
     map that fits best. Height: peak to valley out of the board's plane.
 
-Run ``python validation/bundle_sandia.py [FOLDER OF SHARED DATA] > validation/results/bundle_sandia.md``.
+Run ``python validation/bundle_sandia.py [FOLDER OF SHARED DATA]``.
 """
 
 import sys
@@ -69,7 +69,6 @@ def main() -> None:
     """Print the table."""
     folder = Path(sys.argv[1] if len(sys.argv) > 1 else "/work/shared/data")
     observations = detect(folder / "sandia_checkerboard" / "*.png", BOARD)
-    print(__doc__.split("\n\nRun")[0])
     print("\n| weights | board | pixels | rms px | rejected | others' rms, from even | from odd ", end="")
     print("| halves: median, worst px | fx | fy | cx | cy | spacing y/x | shear mrad | height mm |")
     print("|---" * 15 + "|")

@@ -9,7 +9,7 @@ Way
     `Solver.solve`, start, checks and covariance included, and of ``cv2.calibrateCamera`` alone, in turn; the quickest
     of five of each, and the median of the five ratios. Other work on the machine makes both slower, not their ratio.
 
-Run ``python validation/bundle_speed.py > validation/results/bundle_speed.md``.
+Run ``python validation/bundle_speed.py``.
 """
 
 import time
@@ -42,7 +42,6 @@ def seconds(call: Callable[[], object]) -> float:
 
 def main() -> None:
     """Print the table."""
-    print(__doc__.split("\n\nRun")[0])
     print(
         f"\nOpenCV {cv2.__version__}.\n\n| views | what | OpenCV s | bundle s | ratio, median |\n|---|---|---|---|---|"
     )

@@ -1,11 +1,18 @@
 """Coverage-guided fuzzing of the readers of binary files: only our own errors come out, in bounded time and memory.
 
+Claim
+    Whatever the bytes, only our own errors come out of the readers, each input within 5 s and the process within 1 GiB.
+
+Way
+    atheris (libFuzzer, guided by coverage of the readers), from the small files of the tests, inputs up to 8 KiB.
+
 Run ``python validation/fuzz_formats.py matlab 60`` (or ``colmap-bin``): 60 seconds with atheris, which has to be
-installed. It starts from the small files of the tests, ends with an error at the first exception that is none of ours,
-an input that takes longer than 5 s, or 1 GiB of memory; what broke it is left in a file by libFuzzer.
+installed; without arguments, a minute of each. It ends with an error at the first exception that is none of ours, an
+input that takes longer than 5 s, or 1 GiB of memory; what broke it is left in a file by libFuzzer.
 """
 
 import contextlib
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -15,6 +22,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 def main() -> None:
     """Fuzz the format named on the command line, for so many seconds."""
+    if len(sys.argv) == 1:  # a fuzzer ends its process: each gets one of its own
+        for format_name in ("matlab", "colmap-bin"):
+            subprocess.run([sys.executable, __file__, format_name, "60"], check=True)
+            print(f"{format_name}: 60 s without a failure", flush=True)
+        return
     import atheris
 
     name, seconds = sys.argv[1], int(sys.argv[2])

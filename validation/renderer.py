@@ -1,6 +1,14 @@
 """Are rendered photographs true? Edges in them against OpenCV's projection of those edges; and what they cost.
 
-Run: ``python validation/renderer.py > validation/results/renderer.md``.
+Claim
+    Every edge and corner is where the camera projects it, to better than 1e-4 px rms.
+
+Way
+    Shares nothing with the renderer but the lens parameters. Edges are projected by OpenCV, and found in the image by
+    adding up light along a row (or column) of pixels across them, which no symmetric blur can change but by the edge's
+    own bend, which is taken off.
+
+Run ``python validation/renderer.py``.
 """
 
 import sys
