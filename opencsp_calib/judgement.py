@@ -18,12 +18,15 @@ __all__ = ["REMARKS", "Verdict", "fold_inside", "judge", "verdict"]
 
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
+PARALLEL_DEG = (
+    10.0  # parallel planes have one vanishing line between them: two equations for fx, fy, cx, cy (Zhang 2000)
+)
 TILT_WANTED_DEG = (30.0, 45.0)
 FEW_VIEWS = 10
 COVERAGE_WANTED = 0.5
 ASPECT_SIGMAS = 3.0
 RANGE_SPREAD = 1.1
-DISQUALIFYING = ("poor-rms", "head-on", "fold-inside")
+DISQUALIFYING = ("poor-rms", "not-converged", "head-on", "parallel", "fold-inside")
 REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
 
 
@@ -49,6 +52,7 @@ def judge(calibration: Calibration) -> tuple[Problem, ...]:
         *(_poor_view(view) for view in views),
         _few_views(whole),
         _head_on(whole),
+        _parallel(calibration, whole),
         _tilts(views),
         _coverage(whole),
         _one_way_up(whole),
@@ -104,6 +108,18 @@ def _head_on(whole: SetQuality) -> Problem | None:
         "take views with the board tilted by 30 to 45 degrees"
     )
     return Problem("head-on", message)
+
+
+def _parallel(calibration: Calibration, whole: SetQuality) -> Problem | None:
+    normals = np.array([pose.matrix[:, 2] for pose in calibration.cam_from_board])
+    widest = float(np.degrees(np.arccos(np.clip(normals @ normals.T, -1.0, 1.0).min())))
+    if widest >= PARALLEL_DEG or whole.tilts_deg[2] < HEAD_ON_DEG or whole.views < 2:
+        return None
+    message = (
+        f"all views hold the board parallel, within {widest:.0f} degrees: nothing but the distortion tells the focal "
+        "length and the principal point then; tilt the board by 30 to 45 degrees to the left, right, up and down"
+    )
+    return Problem("parallel", message)
 
 
 def _tilts(views: tuple[ViewQuality, ...]) -> Problem | None:

@@ -23,6 +23,7 @@ from opencsp_calib.errors import InputError
 
 __all__ = [
     "Alignment",
+    "SigmaCurve",
     "SigmaMap",
     "board_ranges",
     "camera_sigma_map",
@@ -65,6 +66,23 @@ class SigmaMap:
     def worst_px(self) -> float:
         """The largest over the image."""
         return float(np.nanmax(self.sigma_px))
+
+
+@dataclass(frozen=True, eq=False)
+class SigmaCurve:
+    """Standard deviations of projections over range, rms over the image.
+
+    Parameters
+    ----------
+    ranges_m : (R,) m
+    sigma_px : (R,) px
+    sigma_rad : (R,) rad
+        Of the direction in which a thing at that range is seen.
+    """
+
+    ranges_m: Floats = field(repr=False)
+    sigma_px: Floats
+    sigma_rad: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +197,7 @@ def camera_sigma_map(
 
 def sigma_over_range(
     calibration: Calibration, ranges_m: Sequence[float], *, covariance: Matrix | None = None
-) -> Floats:
+) -> SigmaCurve:
     """Standard deviation of projections at each range, rms over the image, the frame being fixed by the boards.
 
     Turn and shift of the frame are fitted once, to the grid of pixels at the ranges that the boards' corners had. It
@@ -192,10 +210,6 @@ def sigma_over_range(
         Distances from the camera; infinity is one.
     covariance : (P, P), optional
         As in `projection_covariance`.
-
-    Returns
-    -------
-    (R,) px
     """
     camera, ranges = calibration.camera, np.asarray(ranges_m, dtype=np.float64)
     if not (ranges > 0).all():
@@ -206,9 +220,11 @@ def sigma_over_range(
     covariance = calibration.covariance if covariance is None else covariance
     sigmas = []
     for distance in np.minimum(ranges, 1e6 * far):  # as good as infinity
-        jacobian, _ = alignment.jacobian(rays * distance)
-        sigmas.append(np.sqrt((_length(_propagated(jacobian, covariance)) ** 2).mean()))
-    return np.array(sigmas)
+        jacobian, by_point = alignment.jacobian(rays * distance)
+        across = np.asarray(np.linalg.solve(_by_angle(by_point, rays, distance), jacobian))
+        sigmas.append([np.sqrt((_length(_propagated(j, covariance)) ** 2).mean()) for j in (jacobian, across)])
+    sigma_px, sigma_rad = np.array(sigmas).T
+    return SigmaCurve(ranges, sigma_px, sigma_rad)
 
 
 def board_ranges(calibration: Calibration) -> tuple[float, float]:
@@ -228,11 +244,16 @@ def _at(camera: Camera, pixels: Pixels, range_m: float | None, grid: tuple[int, 
         alignment = Alignment.at_range(camera, range_m, grid=grid)
     rays = camera.unproject(pixels)
     jacobian, by_point = alignment.jacobian(rays * (range_m or 1.0))
+    return jacobian, _by_angle(by_point, rays, range_m or 1.0)
+
+
+def _by_angle(by_point: Floats, rays: Points, range_m: float) -> Floats:
+    """(N, 2, 2) px/rad: how pixels move when what is seen along unit rays (N, 3) turns about the camera."""
     across = np.where(np.abs(rays[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
     first = np.cross(rays, across)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     tangents = np.stack([first, np.cross(rays, first)], axis=2)
-    return jacobian, by_point @ tangents * (range_m or 1.0)
+    return np.asarray(by_point @ tangents * range_m)
 
 
 def _grid_rays(camera: Camera, grid: tuple[int, int] = GRID) -> Points:

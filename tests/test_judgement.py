@@ -64,6 +64,14 @@ def test_head_on_views_do_not_determine_the_focal_length() -> None:
     assert "30 to 45 degrees" in verdict(bad).sentence
 
 
+def test_parallel_boards_do_not_determine_the_camera_however_tilted() -> None:
+    same = result(tuple(tilted(35, roll, 0.5, place) for roll, place in ((0, (0.4, 0.5)), (90, (0.6, 0.4)))))
+    assert "parallel" in codes(same)
+    assert "head-on" not in codes(same)
+    assert verdict(same).level == "bad"
+    assert "parallel" not in codes(result((tilted(35, 0, 0.5), tilted(20, 0, 0.5))))
+
+
 def test_views_at_one_range_and_small_ones_are_said() -> None:
     same = result(tuple(tilted(35, roll, 0.4) for roll in (0, 5, 90)))
     assert "low-coverage" in codes(same)

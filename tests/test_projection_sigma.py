@@ -74,15 +74,17 @@ def test_a_turn_of_the_camera_is_no_uncertainty_of_a_narrow_one() -> None:
 def test_over_range_it_is_least_where_the_boards_were(calibration: Calibration) -> None:
     near, far = board_ranges(calibration)
     ranges = np.geomspace(near / 30, far * 30, 61)
-    sigmas = sigma_over_range(calibration, ranges)
+    sigmas = sigma_over_range(calibration, ranges).sigma_px
     assert near / 2 < ranges[sigmas.argmin()] < far * 2
     assert (np.diff(sigmas[: sigmas.argmin() + 1]) <= 0).all()
     assert (np.diff(sigmas[sigmas.argmin() :]) >= 0).all()
-    assert sigma_over_range(calibration, [np.inf])[0] == pytest.approx(
-        sigma_over_range(calibration, [1e9])[0], rel=1e-6
-    )
+    at_infinity = sigma_over_range(calibration, [np.inf])
+    assert at_infinity.sigma_px == pytest.approx(sigma_over_range(calibration, [1e9]).sigma_px, rel=1e-6)
     # at infinity a turn fitted there is the best there is: a frame fixed at the boards cannot do better
-    assert sigma_over_range(calibration, [np.inf])[0] >= sigma_map(calibration).rms_px * (1 - 1e-9)
+    assert at_infinity.sigma_px[0] >= sigma_map(calibration).rms_px * (1 - 1e-9)
+    whole = sigma_map(calibration)
+    ratios = whole.sigma_rad / whole.sigma_px  # of every pixel, by another way; their mean is between the extremes
+    assert ratios.min() < at_infinity.sigma_rad[0] / at_infinity.sigma_px[0] < ratios.max()
     with pytest.raises(InputError, match="positive"):
         sigma_over_range(calibration, [0.0])
 

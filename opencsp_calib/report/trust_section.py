@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.errors import CalibError
 from opencsp_calib.projection_sigma import board_ranges, sigma_map, sigma_over_range
 from opencsp_calib.report.figures import ACCENT, COLOURS, as_image, image_axes, new_figure
 from opencsp_calib.report.html import table
+from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.uncertainty import Influence, influence, student_factor
 
 if TYPE_CHECKING:
@@ -38,6 +40,7 @@ def trust_section(calibration: Calibration) -> str:
         "<p>Honest standard deviations come from leaving out each view in turn: neighbouring corners share their "
         "errors and boards flex, so that the residuals alone promise too much. The truth lies within "
         f"{factor:.2f} standard deviations with 95 % confidence. Over the image, frames aligned:</p>"
+        + _three_estimates(calibration)
         + as_image(sigma_plot(calibration), "standard deviation of projections over the image")
         + as_image(range_plot(calibration), "standard deviation of projections over range")
         + '<div class="side"><div>'
@@ -47,6 +50,23 @@ def trust_section(calibration: Calibration) -> str:
         + "</div></div>"
         + as_image(influence_plot(influences), "influence of each view")
     )
+
+
+def _three_estimates(calibration: Calibration) -> str:
+    """The same figure three times: one standard deviation of what the camera sees, rms over the image."""
+    by_residuals = sigma_map(calibration, covariance=calibration.covariance_residual).rms_px
+    rows = [
+        ("residuals, as if corners erred independently", f"{by_residuals:.3g}"),
+        ("leaving out each view in turn: the honest one", f"{sigma_map(calibration).rms_px:.3g}"),
+    ]
+    try:
+        apart = nearby_halves(calibration)
+        rows.append(
+            (f"odd against even views: half of the {apart.rms_px:.3g} px between them", f"{apart.rms_px / 2:.3g}")
+        )
+    except CalibError as error:
+        rows.append((f"odd against even views: {error}", ""))
+    return table(("estimate, from", "px rms"), rows)
 
 
 def sigma_plot(calibration: Calibration) -> "Figure":
@@ -63,14 +83,15 @@ def sigma_plot(calibration: Calibration) -> "Figure":
 
 def range_plot(calibration: Calibration) -> "Figure":
     """Standard deviation of projections over range; the ranges at which boards were seen are shaded."""
-    figure, (axes,) = new_figure(8, 2.6)
+    figure, panels = new_figure(10, 2.6, 2)
     near, far = board_ranges(calibration)
-    ranges = np.geomspace(near / 3, far * 10, 60)
-    axes.plot(ranges, sigma_over_range(calibration, ranges.tolist()), color=ACCENT)
-    axes.axvspan(near, far, color=ACCENT, alpha=0.15, label="boards were here")
-    axes.set(xscale="log", xlabel="range (m)", ylabel="sigma (px rms)")
-    axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize=8)
+    curve = sigma_over_range(calibration, np.geomspace(near / 3, far * 10, 60).tolist())
+    for axes, values, unit in zip(panels, (curve.sigma_px, curve.sigma_rad * 1e3), ("px", "mrad"), strict=True):
+        axes.plot(curve.ranges_m, values, color=ACCENT)
+        axes.axvspan(near, far, color=ACCENT, alpha=0.15, label="boards were here")
+        axes.set(xscale="log", xlabel="range (m)", ylabel=f"one standard deviation\n({unit}, rms over the image)")
+        axes.set_ylim(bottom=0)
+        axes.legend(frameon=False, fontsize=8)
     return figure
 
 

@@ -3,6 +3,7 @@
 import os
 from html import escape
 
+from opencsp_calib.comparison import compare
 from opencsp_calib.report.document import write_document
 from opencsp_calib.report.figures import as_image
 from opencsp_calib.report.html import table
@@ -73,8 +74,25 @@ def _models(validation: Validation) -> str:
         )
         for trial in trials
     ]
+    remarks = [
+        f"{trial.model}, {trial.board_shape} board: "
+        + "; ".join((*(["the one that the data support"] if trial.supported else []), *trial.signs))
+        for trial in trials
+        if trial.supported or trial.signs
+    ]
     return (
         "<h2>Models, and the board</h2><p>A richer model always lowers the rms; what counts is whether views that were "
         "held out, and halves, agree better.</p>"
         + table(("lens model", "board", "rms (px)", "held out (px)", "halves (px rms)"), rows)
+        + f"<ul>{''.join(f'<li>{escape(remark)}</li>' for remark in remarks)}</ul>"
+        + _board(validation)
     )
+
+
+def _board(validation: Validation) -> str:
+    own, other = validation.trials.own, validation.trials.other_board
+    if own is None or other is None:
+        return ""
+    title = f"{own.board_shape} board and {other.board_shape} board"
+    plot = difference_plot(compare(own.calibration.camera, other.calibration.camera))
+    return f"<h3>{title}: what solving for its shape does to the camera</h3>{as_image(plot, title)}"
