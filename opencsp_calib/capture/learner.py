@@ -73,7 +73,7 @@ class Learner:
 
     def _learned(self, photographs: tuple[Path, ...]) -> Knowledge:
         self._views = {path: self._views.get(path) or self._view(path) for path in photographs}
-        return self._learn(self.board, self._image_size, tuple(self._views.values()))
+        return self._learn(self.board, self._image_size, tuple(self._views.values()), before=self.knowledge)
 
     def _view(self, path: Path) -> View:
         try:

@@ -1,9 +1,6 @@
 """The command that takes photographs: capture."""
 
-import logging
 import shlex
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,12 +8,10 @@ import typer
 
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import say
-from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
-    from opencsp_calib.capture import Capture, CaptureFolder
+    from opencsp_calib.capture import CaptureFolder, Prepared
     from opencsp_calib.coach import Knowledge
-    from opencsp_calib.interfaces import ImageSource
 
 FINISHED_WITH_NOTHING = 1
 
@@ -50,23 +45,22 @@ def capture(
     ] = 0.1,
 ) -> None:
     """Take photographs of a board, with a coach that says where to hold it and releases at the right moment."""
-    from opencsp_calib import pipeline
-    from opencsp_calib.capture import Capture, CaptureFolder, release_from
-    from opencsp_calib.looking import Search
-    from opencsp_calib.registry import installed
+    from opencsp_calib.capture import prepared, settings_from
 
-    registry = installed()
-    found = pipeline.board_from(board)
-    detector = registry.detector_for(found)
-    chosen, how, values = registry.image_source(source), release_from(release), settings_from(settings or [])
-    device = _device(chosen, device, folder)
-    photographs = CaptureFolder.opened(folder, found.spec, source, device)
-    before = len(photographs.images)
-    if before:
-        say(f"{folder} has {before} photographs already: going on after them")
-    search = Search(found, detector, "model" if detector.feature == "corner" else "none")
-    run = Capture(photographs, search, how, count, range_m=working_range, goal_px=goal)
-    knowledge = _run(run, chosen, device, values)
+    ready = prepared(
+        folder,
+        board,
+        source=source,
+        device=device,
+        release=release,
+        count=count,
+        settings=settings_from(settings or []),
+        range_m=working_range,
+        goal_px=goal,
+        tell=say,
+    )
+    knowledge = _run(ready)
+    photographs = ready.capture.folder
     _say_end(photographs, count, knowledge, board)
     if not photographs.images:
         raise typer.Exit(FINISHED_WITH_NOTHING)
@@ -75,86 +69,19 @@ def capture(
 COMMANDS = (capture,)
 
 
-def settings_from(pairs: list[str]) -> dict[str, str]:
-    """What ``--set FEATURE=VALUE`` says, in order; of a feature set twice the last."""
-    values: dict[str, str] = {}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not (equals and name.strip()):
-            raise InputError(f"--set takes FEATURE=VALUE, such as --set ExposureTime=5000, not {pair!r}")
-        values.pop(name.strip(), None)
-        values[name.strip()] = value.strip()
-    return values
-
-
-def _device(source: "ImageSource", device: str | None, folder: Path) -> str:
-    """The device named; else the first there is."""
-    if device is None:
-        there = list(source.devices())
-        if len(there) > 1:
-            say(f"of {len(there)} cameras {there[0]} is taken; name another with --device: {', '.join(there[1:])}")
-        return there[0] if there else ""
-    if Path(device).exists() and folder.exists() and Path(device).samefile(folder):
-        raise InputError(f"images cannot be taken from {device} into the same folder; name another DIR")
-    return device
-
-
-def _run(run: "Capture", source: "ImageSource", device: str, settings: dict[str, str]) -> "Knowledge | None":
+def _run(ready: "Prepared") -> "Knowledge | None":
     """The capture, shown live; whatever stops it, the photographs taken are safe."""
-    from threadpoolctl import threadpool_limits
-
     from opencsp_calib.cli.keys import keys_pressed
     from opencsp_calib.cli.live import LiveText
-    from opencsp_calib.opencv import opencv_on_one_thread
 
+    run = ready.capture
     keys = {" ": run.press, "d": run.delete_last, "q": run.stop}
     try:
-        with (
-            threadpool_limits(1),  # small matrices: threads would only get in each other's way
-            opencv_on_one_thread(),
-            LiveText(run.release) as live,
-            _told(live.say),
-            keys_pressed(keys),
-            source.open(device, **settings) as images,
-        ):
-            return run.run(images, live.show)
-    except InputError as error:
-        taken = len(run.folder.images)
-        if taken:
-            raise InputError(f"{error}; {_safe(run.folder, taken)}") from None
-        raise
+        with LiveText(run.release) as live, keys_pressed(keys):
+            return ready.run(live.show, live.say)
     except KeyboardInterrupt:
-        say(f"stopped: {_safe(run.folder, len(run.folder.images))}")
+        say(f"stopped: {ready.safe}")
         raise typer.Exit(1) from None
-
-
-def _safe(folder: "CaptureFolder", taken: int) -> str:
-    return f"the {taken} photographs taken are safe in {folder.path}, and the same command goes on after them"
-
-
-@contextmanager
-def _told(tell: Callable[[str], None]) -> Iterator[None]:
-    """What a source has to say while it works, such as what it set in the camera, shown to the person."""
-    logger = logging.getLogger("opencsp_calib")
-    handler = _Teller(tell)
-    level = logger.level
-    logger.addHandler(handler)
-    logger.setLevel(logging.INFO)
-    try:
-        yield
-    finally:
-        logger.removeHandler(handler)
-        logger.setLevel(level)
-
-
-class _Teller(logging.Handler):
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        super().__init__()
-        self._tell = tell
-
-    def emit(self, record: logging.LogRecord) -> None:
-        """Pass a message on."""
-        self._tell(record.getMessage())
 
 
 def _say_end(folder: "CaptureFolder", count: int, knowledge: "Knowledge | None", board: str) -> None:

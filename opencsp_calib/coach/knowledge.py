@@ -14,7 +14,7 @@ from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.coach.lacking import Lack, lacks
-from opencsp_calib.coach.next_view import SHAPED, SIGMA_PX, NextView, candidates, choose, detection_from
+from opencsp_calib.coach.next_view import SHAPED, SIGMA_PX, Candidates, NextView, candidates, choose, detection_from
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError
 from opencsp_calib.information import ProjectionGoal, view_information
@@ -28,6 +28,7 @@ __all__ = ["GOAL_PX", "Knowledge", "learn"]
 
 GOAL_PX = 0.1  # rms over the image: a tenth of a pixel is well below what a measurement with the camera resolves
 ENOUGH_TO_SOLVE = 4
+SAME_CAMERA = 0.02  # of the focal length
 USUAL_FOCAL = 1.5  # image widths: what is taken before anything is known
 
 
@@ -54,6 +55,8 @@ class Knowledge:
         What the set still needs.
     next_view : NextView, optional
         Where to hold the board next.
+    possible : Candidates
+        That it was chosen from.
     goal, information
         For what a further view would be worth: see `gain_of`.
     """
@@ -68,6 +71,7 @@ class Knowledge:
     goal_px: float
     lacks: tuple[Lack, ...]
     next_view: NextView | None
+    possible: Candidates = field(repr=False)
     goal: ProjectionGoal = field(repr=False)
     information: Matrix = field(repr=False)
 
@@ -110,6 +114,7 @@ def learn(
     *,
     range_m: float | None = None,
     goal_px: float = GOAL_PX,
+    before: Knowledge | None = None,
 ) -> Knowledge:
     """What these views tell.
 
@@ -123,6 +128,8 @@ def learn(
         At which the camera will work; None for infinity.
     goal_px : float
         The uncertainty of projections to reach.
+    before : Knowledge, optional
+        From fewer views of the same: what it has found out is not found out again.
     """
     observations = Observations(board, image_size, tuple(view for view in views if view.status == "used"))
     calibration, why_not = _solved(observations)
@@ -136,7 +143,7 @@ def learn(
     told = view_information(camera, board, observations.detections, poses, options=SHAPED, sigma_px=SIGMA_PX)
     known = told.sum(axis=0)
     missing = lacks(observations, poses)
-    possible = candidates(camera, board, rng=len(poses))
+    possible = _still_possible(camera, before) or candidates(camera, board, rng=len(poses))
     suggested = choose(
         possible, camera, board, goal, known, lambda pose: sum(lack.helped_by(camera, board, pose) for lack in missing)
     )
@@ -151,9 +158,18 @@ def learn(
         goal_px=goal_px,
         lacks=missing,
         next_view=suggested,
+        possible=possible,
         goal=goal,
         information=known,
     )
+
+
+def _still_possible(camera: Camera, before: Knowledge | None) -> Candidates | None:
+    """The candidates there were, where the camera has not changed so much that they would look different."""
+    if before is None:
+        return None
+    moved = np.abs(camera.params[:4] - before.camera.params[:4]).max()
+    return before.possible if moved < SAME_CAMERA * camera.params[0] else None
 
 
 def _solved(observations: Observations) -> tuple[Calibration | None, str]:

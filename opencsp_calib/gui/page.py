@@ -13,7 +13,7 @@ from typing import TypeAlias
 from nicegui import ui
 
 from opencsp_calib.errors import CalibError
-from opencsp_calib.gui import board_fields, calibrating, corners, photographs, saving, status, views
+from opencsp_calib.gui import board_fields, calibrating, capturing, corners, photographs, saving, status, views
 from opencsp_calib.gui.session import Session
 
 __all__ = ["Page", "show"]
@@ -29,7 +29,7 @@ STEPS: tuple[tuple[str, Build], ...] = (
     ("Save", saving.build),
 )
 RESULTS: tuple[tuple[str, Build], ...] = (("Photographs", views.build),)
-TABS: tuple[tuple[str, Build], ...] = ()
+TABS: tuple[tuple[str, Build], ...] = (("Capture", capturing.build),)
 
 
 class Page:
@@ -44,6 +44,15 @@ class Page:
     def show_result(self, name: str) -> None:
         """Bring one of `RESULTS` to the front."""
         self._results.set_value(name)
+
+    @property
+    def tab(self) -> str:
+        """Which tab is shown: ``Calibrate``, or one of `TABS`."""
+        return str(self._tabs.value)
+
+    def show_tab(self, name: str) -> None:
+        """Bring a tab to the front."""
+        self._tabs.set_value(name)
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Do what a person asked for; what is wrong with it goes into the status."""
@@ -61,7 +70,7 @@ class Page:
                 for name, _ in (("Calibrate", None), *TABS):
                     ui.tab(name)
             _theme_button()
-        with ui.tab_panels(tabs, value="Calibrate", animated=False).classes("panels body"):
+        with ui.tab_panels(tabs, value="Calibrate", animated=False).classes("panels body") as self._tabs:
             with ui.tab_panel("Calibrate").classes("bare"):
                 self._build_calibrate()
             for name, build in TABS:

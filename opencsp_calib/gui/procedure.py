@@ -8,7 +8,7 @@ from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.session import Session
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 
-__all__ = ["calibrate", "find_corners", "put_back", "remove"]
+__all__ = ["calibrate", "find_and_calibrate", "find_corners", "put_back", "remove"]
 
 
 def find_corners(session: Session) -> None:
@@ -19,6 +19,16 @@ def find_corners(session: Session) -> None:
 def calibrate(session: Session) -> None:
     """Solve for the camera from all views that are not removed."""
     session.start("Calibrating", partial(_calibrate, session))
+
+
+def find_and_calibrate(session: Session) -> None:
+    """Both steps, one after the other."""
+
+    async def both() -> None:
+        await _find_corners(session)
+        await _calibrate(session)
+
+    session.start("Finding corners and calibrating", both, len(session.selection.files))
 
 
 def remove(session: Session, names: Iterable[str]) -> None:

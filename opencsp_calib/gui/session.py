@@ -29,6 +29,7 @@ from opencsp_calib.atomic import replacing
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.gui.camera import LiveCamera
 from opencsp_calib.gui.files import shown
 from opencsp_calib.gui.news import Level, Message, Progress
 from opencsp_calib.gui.selection import Selection
@@ -59,6 +60,7 @@ class Session:
         self.own = self.folder / FOLDER
         self.changed: Event[[]] = Event()
         self.worker = Worker()
+        self.camera = LiveCamera()
         self.settings = Settings()
         self.selection = Selection(self.folder, self.own / "photographs")
         self.views: dict[str, dict[str, Any]] = {}  # by image, as `summary.view_as_json`
@@ -176,6 +178,7 @@ class Session:
         """Keep all, and end the work."""
         self.keep()
         self.worker.stop()
+        self.camera.close()
 
     def _tell_now(self) -> None:
         self._news = None

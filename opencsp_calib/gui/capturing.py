@@ -1,0 +1,164 @@
+"""The tab Capture: the live picture with corners and the next view drawn in it, gauges, and the shutter."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+from opencsp_calib.gui.camera import SHOWN_PX, LiveCamera
+from opencsp_calib.gui.controls import action, choice, field, quiet_action
+from opencsp_calib.gui.files import within
+from opencsp_calib.gui.procedure import find_and_calibrate
+from opencsp_calib.registry import installed
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.page import Page
+
+__all__ = ["build"]
+
+RELEASES = {"coach": "when the coach finds it right", "manual": "by hand", "interval:2": "every two seconds"}
+MARKS = {"good": "✓", "bad": "✗", "unknown": "?"}
+NOTHING = "data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7"
+
+
+def build(page: "Page") -> Callable[[], None]:
+    """See `page.py`."""
+    camera = page.session.camera
+    with ui.element("div").classes("columns"):
+        with ui.element("div").classes("steps"):
+            refresh_controls = _controls(page, camera)
+            refresh_gauges = _gauges(camera)
+        with ui.element("main").classes("results live"):
+            refresh_picture = _picture(camera)
+
+    def refresh() -> None:
+        refresh_controls()
+        refresh_gauges()
+        refresh_picture()
+
+    camera.changed.subscribe(refresh)
+    return refresh
+
+
+def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
+    asked = {"source": "basler", "device": "", "release": "coach", "count": "50", "folder": "photographs", "set": ""}
+
+    def take(name: str) -> Callable[[str], None]:
+        return lambda value: asked.update({name: value})
+
+    async def start() -> None:
+        folder = within(page.session.folder, asked["folder"])
+        count = int(asked["count"]) if asked["count"].isdecimal() else 50
+        await camera.start(
+            folder=str(folder),
+            board=page.session.settings.spec,
+            source=asked["source"],
+            device=asked["device"] or None,
+            release=asked["release"],
+            count=max(1, count),
+            settings=[line.strip() for line in asked["set"].splitlines() if line.strip()],
+        )
+
+    def calibrate() -> None:
+        page.session.forget_photographs()
+        page.session.selection.add(asked["folder"])
+        find_and_calibrate(page.session)
+        page.show_tab("Calibrate")
+
+    def on_key(event: KeyEventArguments) -> None:
+        if event.action.keydown and not event.action.repeat and event.key.space and page.tab == "Capture":
+            camera.order("press")
+
+    ui.keyboard(on_key=on_key)
+    with ui.element("section").classes("step"):
+        sources = {name: name for name in sorted(installed().image_sources)}
+        choice("Images from", sources, asked["source"], take("source"))
+        field("Camera (serial number) or folder", "", take("device"), "capture-device", "the first camera")
+        field("Photographs go to the folder", asked["folder"], take("folder"), "capture-folder")
+        with ui.element("div").classes("side-by-side"):
+            choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
+            field("Photographs", asked["count"], take("count"), "capture-count")
+        settings = ui.textarea(
+            "Camera settings, one FEATURE=VALUE a line", on_change=lambda e: asked.update(set=e.value)
+        )
+        settings.props("outlined dense autogrow data-testid=capture-settings").classes("field")
+        begin = action("Start", start, "capture-start")
+        end = quiet_action("Stop", lambda: camera.order("stop"), "capture-stop")
+        with ui.element("div").classes("side-by-side"):
+            press = quiet_action("Release (space)", lambda: camera.order("press"), "capture-release-now")
+            delete = quiet_action("Delete last", lambda: camera.order("delete"), "capture-delete")
+        on = action("Calibrate these", lambda: page.attempt(calibrate), "capture-calibrate")
+
+    def refresh() -> None:
+        begin.set_visibility(not camera.running)
+        begin.set_enabled(page.session.settings.is_complete)
+        for button in (end, press, delete):
+            button.set_visibility(camera.running)
+        taken = bool(camera.frame and camera.frame["taken"])
+        on.set_enabled(taken and not camera.running and not page.session.busy)
+
+    return refresh
+
+
+def _gauges(camera: LiveCamera) -> Callable[[], None]:
+    with ui.element("section").classes("step"):
+        table = ui.html(sanitize=True).classes("gauges").props("data-testid=capture-gauges")
+    with ui.element("section").classes("step"):
+        known = ui.label().classes("value").props("data-testid=capture-known")
+        bar = ui.linear_progress(value=0.0, show_value=False, size="6px").props("rounded aria-label=Progress")
+        following = ui.label().classes("hint").props("data-testid=capture-next")
+        missing = ui.label().classes("hint missing").props("data-testid=capture-missing")
+
+    def refresh() -> None:
+        frame = camera.frame
+        if frame is None:
+            return
+        table.set_content("".join(_row(*gauge) for gauge in frame["gauges"]))
+        sigma = f"{frame['sigma_px']:.2g} px, goal {frame['goal_px']:g}" if frame["sigma_px"] else frame["why_not"]
+        known.set_text(f"{frame['taken']} of {frame['count']}: {sigma}")
+        bar.set_value(frame["progress"])
+        following.set_text(f"Next: {frame['next']}" if frame["next"] else "")
+        missing.set_text("\n".join(f"Missing: {lack}" for lack in frame["lacks"]))
+
+    return refresh
+
+
+def _row(name: str, state: str, value: str) -> str:
+    return f'<div class="gauge {state}"><b>{MARKS[state]}</b><span>{name}</span><span>{value}</span></div>'
+
+
+def _picture(camera: LiveCamera) -> Callable[[], None]:
+    advice = ui.label().classes("advice").props("data-testid=capture-advice role=status aria-live=polite")
+    picture = ui.interactive_image(NOTHING, cross=False, sanitize=False).classes("live-picture")
+    picture.props("data-testid=capture-picture")
+    said = ui.label().props("data-testid=capture-message")
+
+    def refresh() -> None:
+        said.set_text(camera.message.text)
+        said.classes(replace=f"status {camera.message.level}")
+        frame = camera.frame
+        if frame is None:
+            advice.set_text("")
+            return
+        advice.set_text(frame["advice"])
+        picture.set_source(f"data:image/jpeg;base64,{frame['picture']}")
+        picture.set_content(_drawn(frame))
+
+    return refresh
+
+
+def _drawn(frame: dict[str, Any]) -> str:
+    """Corners found, and the outline of the next view, in pixels of the picture as it is shown."""
+    width, height = frame["size"]
+    scale = min(1.0, SHOWN_PX / max(width, height))
+
+    def at(x: float, y: float) -> str:
+        return f"{(x + 0.5) * scale - 0.5:.1f},{(y + 0.5) * scale - 0.5:.1f}"
+
+    outline = " ".join(at(x, y) for x, y in frame["outline"])
+    dots = "".join(f"M{at(x, y)} m-2,0 h4 m-2,-2 v4" for x, y in frame["corners"])
+    return (
+        f'<polygon points="{outline}" fill="none" stroke="#ffb000" stroke-width="3" stroke-dasharray="10 6"/>'
+        f'<path d="{dots}" stroke="#35d07f" stroke-width="1.5" fill="none"/>'
+    )
