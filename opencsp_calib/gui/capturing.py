@@ -25,12 +25,13 @@ NOTHING = "data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAE
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     camera = page.session.camera
-    with ui.element("div").classes("columns"):
+    with ui.element("div").classes("columns capture"):
         with ui.element("div").classes("steps"):
             refresh_controls = _controls(page, camera)
-            refresh_gauges = _gauges(camera)
         with ui.element("main").classes("results live"):
             refresh_picture = _picture(camera)
+        with ui.element("div").classes("told"):
+            refresh_gauges = _gauges(camera)
 
     def refresh() -> None:
         refresh_controls()
@@ -76,25 +77,23 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         choice("Images from", sources, asked["source"], take("source"))
         field("Camera (serial number) or folder", "", take("device"), "capture-device", "the first camera")
         field("Photographs go to the folder", asked["folder"], take("folder"), "capture-folder")
-        with ui.element("div").classes("side-by-side"):
-            choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
-            field("Photographs", asked["count"], take("count"), "capture-count")
-        settings = ui.textarea(
-            "Camera settings, one FEATURE=VALUE a line", on_change=lambda e: asked.update(set=e.value)
-        )
+        choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
+        field("Photographs in all", asked["count"], take("count"), "capture-count")
+        settings = ui.textarea("Settings, one FEATURE=VALUE a line", on_change=lambda e: asked.update(set=e.value))
         settings.props("outlined dense autogrow data-testid=capture-settings").classes("field")
         begin = action("Start", start, "capture-start")
         end = quiet_action("Stop", lambda: camera.order("stop"), "capture-stop")
         with ui.element("div").classes("side-by-side"):
-            press = quiet_action("Release (space)", lambda: camera.order("press"), "capture-release-now")
+            press = quiet_action("Release", lambda: camera.order("press"), "capture-release-now")
             delete = quiet_action("Delete last", lambda: camera.order("delete"), "capture-delete")
+        keys = ui.label("The space bar releases too.").classes("hint")
         on = action("Calibrate these", lambda: page.attempt(calibrate), "capture-calibrate")
 
     def refresh() -> None:
         begin.set_visibility(not camera.running)
         begin.set_enabled(page.session.settings.is_complete)
-        for button in (end, press, delete):
-            button.set_visibility(camera.running)
+        for shown in (end, press, delete, keys):
+            shown.set_visibility(camera.running)
         taken = bool(camera.frame and camera.frame["taken"])
         on.set_enabled(taken and not camera.running and not page.session.busy)
 
@@ -157,8 +156,8 @@ def _drawn(frame: dict[str, Any]) -> str:
         return f"{(x + 0.5) * scale - 0.5:.1f},{(y + 0.5) * scale - 0.5:.1f}"
 
     outline = " ".join(at(x, y) for x, y in frame["outline"])
-    dots = "".join(f"M{at(x, y)} m-2,0 h4 m-2,-2 v4" for x, y in frame["corners"])
+    dots = "".join(f"M{at(x, y)} m-4,0 h8 m-4,-4 v8" for x, y in frame["corners"])
     return (
         f'<polygon points="{outline}" fill="none" stroke="#ffb000" stroke-width="3" stroke-dasharray="10 6"/>'
-        f'<path d="{dots}" stroke="#35d07f" stroke-width="1.5" fill="none"/>'
+        f'<path d="{dots}" stroke="#35d07f" stroke-width="2" fill="none"/>'
     )
