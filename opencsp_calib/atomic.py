@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import stat
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,24 +12,50 @@ from opencsp_calib.errors import InputError
 
 __all__ = ["check_writable", "replacing"]
 
+MAX_NAME = 255  # bytes of a file's name, on nearly every file system
+MAX_SUFFIX = 32
+
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
     """The path, if a file can be written there; to be asked before long work.
 
+    A symbolic link is followed: what it points to is written, and the link stays.
+
     Raises
     ------
     InputError
-        If its folder does not exist or cannot be written to, or it is a folder.
+        If its folder does not exist or cannot be written to; or it is a folder, a device, a pipe, a link in a circle,
+        or has a name that no file can have.
     """
-    path = Path(path)
-    folder = path.parent
+    try:
+        return _writable(Path(path))
+    except (OSError, RuntimeError, ValueError) as error:  # names too long, or with a null; circles of links
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"cannot write {_short(path)}: {reason}") from None
+
+
+def _writable(path: Path) -> Path:
+    target = path.resolve() if path.is_symlink() else path
+    if target.is_symlink():
+        raise InputError(f"cannot write {path}: it is a link that leads back to itself")
+    folder = target.parent
     if not folder.is_dir():
         raise InputError(f"cannot write {path}: the folder {folder} does not exist; create it first")
-    if path.is_dir():
+    mode = target.stat().st_mode if target.exists() else None
+    if mode is not None and stat.S_ISDIR(mode):
         raise InputError(f"cannot write {path}: it is a folder; add a file name")
-    if not os.access(folder, os.W_OK) or (path.exists() and not os.access(path, os.W_OK)):
+    if mode is not None and not stat.S_ISREG(mode):
+        raise InputError(f"cannot write {path}: it is no regular file, but a device or a pipe")
+    if not os.access(folder, os.W_OK) or (mode is not None and not os.access(target, os.W_OK)):
         raise InputError(f"cannot write {path}: no permission")
-    return path
+    if mode is None and len(os.fsencode(target.name)) > MAX_NAME:
+        raise InputError(f"cannot write {_short(path)}: the name is longer than {MAX_NAME} bytes")
+    return target
+
+
+def _short(path: str | os.PathLike[str]) -> str:
+    text = os.fspath(path)
+    return text if len(text) <= MAX_NAME else f"{text[:60]}..."
 
 
 @contextmanager
@@ -53,7 +80,8 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     """
     path = check_writable(path)
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=path.suffix)
+        suffix = path.suffix if len(path.suffix) < MAX_SUFFIX else ""
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=suffix)
         os.close(handle)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror}") from None
@@ -63,6 +91,7 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         _flush(temporary)
         _take_permissions(temporary, path)
         os.replace(temporary, path)
+        _flush_folder(path.parent)
     except OSError as error:
         raise InputError(f"cannot write {path}: {error.strerror or error}") from error
     finally:
@@ -74,6 +103,18 @@ def _flush(path: Path) -> None:
     """Have the operating system put the file's contents on the disk."""
     with path.open("rb+") as file:
         os.fsync(file.fileno())
+
+
+def _flush_folder(folder: Path) -> None:
+    """Have the new name put on the disk too, where the system can: not Windows, nor every network."""
+    if not hasattr(os, "O_DIRECTORY"):
+        return
+    with contextlib.suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _take_permissions(temporary: Path, path: Path) -> None:

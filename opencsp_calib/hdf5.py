@@ -13,7 +13,8 @@
     /Calibration                     ignored by OpenCSP; see `hdf5_calibration`
 
 A file without ``format_version`` is OpenCSP's own; its oddities are read as OpenCSP reads them. Any file whose
-checksum is missing or wrong though it has a ``format_version`` is refused.
+checksum is missing or wrong though it has a ``format_version`` is refused. Behind the HDF5 content stands the checksum
+of all of it, which is looked at first (`seal`).
 """
 
 import hashlib
@@ -32,6 +33,7 @@ from opencsp_calib.atomic import check_writable, replacing
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
+from opencsp_calib.seal import check_seal, seal
 
 if TYPE_CHECKING:
     import h5py
@@ -79,8 +81,9 @@ def written(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
     content = io.BytesIO()
     with h5py.File(content, "w") as file:
         yield file
-    with replacing(path) as temporary:
-        temporary.write_bytes(content.getbuffer())
+    with replacing(path) as temporary, temporary.open("wb") as out:
+        out.write(content.getbuffer())
+        out.write(seal(content.getbuffer()))
 
 
 def load_record(path: str | os.PathLike[str]) -> dict[str, str]:
@@ -136,6 +139,7 @@ def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
     if not path.is_file():
         raise InputError(f"no such file: {path}")
     try:
+        check_seal(path)
         with h5py.File(path, "r") as file:
             yield file
     except InputError:

@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors",
-    "arrays atomic opencv blas provenance",
+    "arrays atomic opencv blas provenance seal",
     "models",
     "camera rotations convex_hull board",
     "pose",

@@ -13,9 +13,12 @@ import typer
 from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, setting_up, window
 from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.setting_up import print_versions
+from opencsp_calib.cli.stopping import stop_when_told
 from opencsp_calib.errors import CalibError
 
 __all__ = ["app", "main"]
+
+INTERRUPTED = 130  # what the argument parser returns for KeyboardInterrupt
 
 app = typer.Typer(
     name="opencsp-calib",
@@ -42,6 +45,7 @@ def options(
 
 def main() -> None:
     """Run the command line; whatever goes wrong ends in one line and an exit code."""
+    stop_when_told()
     sys.exit(run(sys.argv[1:]))
 
 
@@ -54,8 +58,7 @@ def run(arguments: list[str]) -> int:
         complain(str(error))
         return error.exit_code
     except KeyboardInterrupt:
-        complain("stopped; nothing was written")
-        return 1
+        outcome = INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does: nobody is left to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
@@ -67,4 +70,7 @@ def run(arguments: list[str]) -> int:
             raise
         complain(error.format_message())
         return 2
+    if outcome == INTERRUPTED:
+        complain("stopped; what was not finished was not written")
+        return 1
     return outcome if isinstance(outcome, int) else 0

@@ -34,6 +34,8 @@ def kept_beside(output: Path | None, resume: bool) -> "Iterator[Journal | None]"
     try:
         yield journal
     except (KeyboardInterrupt, CancelledError) as error:
+        if not journal.path.exists():  # stopped before anything was done
+            raise
         what = str(error) or "stopped"
         raise CancelledError(f"{what}; what is done is kept in {journal.path}: --resume goes on from there") from None
     except CalibError:
