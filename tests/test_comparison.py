@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib.camera import Camera
-from opencsp_calib.comparison import compare, frame_jacobian, pixel_grid
+from opencsp_calib.comparison import Difference, _rotation_between, compare, frame_jacobian, pixel_grid
 from opencsp_calib.errors import InputError
 
 SIZE = (1626, 1236)
@@ -134,15 +134,78 @@ def test_finite_ranges_differ_by_nothing_but_the_translation() -> None:
 
 @pytest.mark.parametrize("range_m", [0.0, -1.0, np.nan, np.inf])
 def test_an_impossible_range_is_refused(range_m: float) -> None:
-    with pytest.raises(InputError, match="range"):
+    with pytest.raises(
+        InputError, match=f"^the range to compare at must be a positive number of metres, not {range_m}$"
+    ):
         compare(CAMERA, CAMERA, range_m=range_m)
 
 
 def test_images_of_different_sizes_are_refused() -> None:
-    with pytest.raises(InputError, match="1626x1236 and 813x618"):
+    said = "^cameras with images of different sizes cannot be compared by pixels: 1626x1236 and 813x618$"
+    with pytest.raises(InputError, match=said):
         compare(CAMERA, CAMERA.binned(2))
 
 
 def test_a_grid_of_one_pixel_is_refused() -> None:
-    with pytest.raises(InputError, match="at least 2"):
+    with pytest.raises(InputError, match=r"^a grid over the image needs at least 2 columns and 2 rows, not 1x5$"):
         compare(CAMERA, CAMERA, grid=(1, 5))
+    assert compare(CAMERA, CAMERA, grid=(2, 2)).shift.shape == (2, 2, 2)
+
+
+def test_cameras_that_see_hardly_anything_are_refused() -> None:
+    blind = Camera("blind", "opencv4", np.array([900.0, 900, 812.5, 617.5, -1e8, 0.0, 0.0, 0.0]), SIZE)
+    with pytest.raises(
+        InputError, match="^the cameras cannot be compared: hardly any pixel has a direction in both of"
+    ):
+        compare(CAMERA, blind)
+
+
+def test_the_grid_reaches_from_corner_to_corner() -> None:
+    pixels = compare(CAMERA, CAMERA).pixels
+    assert pixels.shape == (30, 40, 2)
+    for corner, expected in (((0, 0), (0, 0)), ((0, -1), (1625, 0)), ((-1, 0), (0, 1235)), ((-1, -1), (1625, 1235))):
+        assert tuple(pixels[corner]) == expected
+    assert np.ptp(np.diff(pixels[0, :, 0])) < 1e-9
+
+
+def test_its_figures_are_those_of_the_lengths_that_are_known() -> None:
+    shift = np.array([[[3.0, 4.0], [0.0, 1.0]], [[0.0, 2.0], [np.nan, 1.0]]])
+    difference = Difference(
+        np.zeros((2, 2, 2)), shift, Rotation.from_rotvec([0, 0.1, 0]).as_matrix(), np.zeros(3), None
+    )
+    np.testing.assert_allclose(difference.length_px, [[5.0, 1.0], [2.0, np.nan]])
+    assert difference.missing == 1
+    assert difference.rms_px == pytest.approx(np.sqrt(30.0 / 3.0))
+    assert (difference.median_px, difference.worst_px) == (2.0, 5.0)
+    assert difference.rotation_deg == pytest.approx(np.degrees(0.1))
+
+
+def test_its_arrays_are_copies_that_nobody_can_change() -> None:
+    given = {
+        "pixels": np.ones((3, 2, 2)),
+        "shift": np.ones((3, 2, 2)),
+        "rotation": np.eye(3),
+        "translation": np.ones(3),
+    }
+    difference = Difference(**given, range_m=1.0)
+    for name, array in given.items():
+        kept = getattr(difference, name)
+        before = kept.copy()
+        array += 1.0
+        assert np.array_equal(kept, before), name
+        assert not kept.flags.writeable, name
+        with pytest.raises(InputError, match=f"^{name} has shape"):
+            replace(difference, **{name: np.zeros((3, 5))})
+        if name != "shift":
+            with pytest.raises(InputError, match=f"^{name} "):
+                replace(difference, **{name: np.full_like(array, np.nan)})
+
+
+def test_a_large_turn_of_the_frame_is_found() -> None:
+    """By the least squares start: a fisheye that is turned by 20 degrees sees half of the same things."""
+    turned = Rotation.from_rotvec([0.1, -0.3, 0.2])
+    rays = FISHEYE.unproject(pixel_grid(SIZE, (9, 7)).reshape(-1, 2))
+    assert _rotation_between(rays, turned.apply(rays)) == pytest.approx(turned.as_matrix(), abs=1e-12)
+    some = turned.apply(rays)
+    some[::2] = np.nan
+    assert _rotation_between(rays, some) == pytest.approx(turned.as_matrix(), abs=1e-12)
