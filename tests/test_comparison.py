@@ -155,7 +155,7 @@ def test_a_grid_of_one_pixel_is_refused() -> None:
 def test_cameras_that_see_hardly_anything_are_refused() -> None:
     blind = Camera("blind", "opencv4", np.array([900.0, 900, 812.5, 617.5, -1e8, 0.0, 0.0, 0.0]), SIZE)
     with pytest.raises(
-        InputError, match="^the cameras cannot be compared: hardly any pixel has a direction in both of"
+        InputError, match=r"^the cameras cannot be compared: hardly any pixel has a direction in both of"
     ):
         compare(CAMERA, blind)
 
