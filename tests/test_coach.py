@@ -102,7 +102,7 @@ def test_the_side_named_is_the_one_that_is_far(azimuth_deg, side):
 
 def test_a_view_in_words():
     words = described(CAMERA, BOARD, shown(40, 90, 90, fill=0.5, place=(0, 0)))
-    assert words.startswith("vertical, in the upper left of the image, 1.14 m away")
+    assert words.startswith("vertical, in the upper left part of the image, 1.14 m away")
     assert words.endswith("its left side turned away by 40 degrees")
 
 

@@ -27,10 +27,10 @@ from opencsp_calib.information import ProjectionGoal, view_information
 from opencsp_calib.pipeline import solve
 from opencsp_calib.synthetic import demo_camera, observe, outline, pose_in_view, turned
 
-SEEDS = 12
+SEEDS = 6
 NOISE_PX = 0.1
 SCATTER_DEG, SCATTER_RANGE = 6.0, 0.06
-RANDOM_VIEWS, COACHED_VIEWS = 50, 30
+RANDOM_VIEWS, COACHED_VIEWS = 50, 20
 TARGETS = (10, 20, 30, 50)
 SHAPES = ("flat", "warp")
 WORLDS = {
@@ -106,7 +106,7 @@ def error_px(camera, board, poses, seed):
 def study(name, camera, board):
     """One world; prints its rows."""
     ratios = {(shape, n): [] for shape in SHAPES for n in TARGETS}
-    errors = {"random 50": [], "coached 15": [], "coached 30": []}
+    errors = {"random 50": [], "coached 15": [], "coached 20": []}
     for seed in range(SEEDS):
         rng = np.random.default_rng(seed)
         anywhere = [random_view(camera, board, rng) for _ in range(RANDOM_VIEWS)]
@@ -119,7 +119,7 @@ def study(name, camera, board):
                 ratios[shape, n].append(needed / n)
         errors["random 50"].append(error_px(camera, board, anywhere, seed))
         errors["coached 15"].append(error_px(camera, board, guided[:15], seed))
-        errors["coached 30"].append(error_px(camera, board, guided, seed))
+        errors["coached 20"].append(error_px(camera, board, guided, seed))
     for shape in SHAPES:
         cells = [f"{np.mean(ratios[shape, n]):.0%} ({max(ratios[shape, n]):.0%})" for n in TARGETS]
         print(f"| {name} | {shape} | {' | '.join(cells)} |", flush=True)
@@ -133,7 +133,7 @@ def main():
     print("|---|---|" + "---|" * len(TARGETS))
     errors = {name: study(name, camera, board) for name, (camera, board) in WORLDS.items()}
     print("\nMedian error of the solved camera, px rms over the image:\n")
-    print("| world | 50 random views | 15 coached | 30 coached |\n|---|---|---|---|")
+    print("| world | 50 random views | 15 coached | 20 coached |\n|---|---|---|---|")
     for name, found in errors.items():
         print(f"| {name} | " + " | ".join(f"{value:.4f}" for value in found.values()) + " |")
 

@@ -86,5 +86,7 @@ class LiveText:
         lines += [Text(f"missing: {lack.message}") for lack in knowledge.lacks]
         known = f"{knowledge.sigma_px:.2g} px" if knowledge.sigma_px > 0 else "not known yet"
         lines.append(Text(f"{state.taken} of {state.count}; uncertainty {known}, goal {knowledge.goal_px:g} px"))
-        lines.append(ProgressBar(total=1.0, completed=knowledge.progress, width=48))
+        bar = Table.grid()  # a bar alone would not end its line
+        bar.add_row(ProgressBar(total=1.0, completed=knowledge.progress, width=48))
+        lines.append(bar)
         return lines

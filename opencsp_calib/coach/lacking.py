@@ -83,7 +83,7 @@ def _tilt(poses: Sequence[Pose]) -> Lack | None:
     good = sum(low <= pose.tilt_deg <= high for pose in poses)
     if poses and good >= len(poses) / 2:
         return None
-    message = f"tilt by 30 to 45 degrees: {good} of {len(poses)} views have that"
+    message = "tilt the board by 30 to 45 degrees" + (f": {good} of {len(poses)} views have that" if poses else "")
     return Lack("tilt", message, lambda _, __, pose: low <= pose.tilt_deg <= high)
 
 
@@ -94,6 +94,8 @@ def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
     if poses and counts[rarer] >= LEAST_OF_EACH * len(poses):
         return None
     message = f"hold the board {rarer}: {counts['horizontal']} views are horizontal, {counts['vertical']} vertical"
+    if not poses:
+        message = "half of the views with the board horizontal, half vertical"
     return Lack("orientation", message, lambda _, board, pose: held(board, pose) == rarer)
 
 
@@ -104,13 +106,13 @@ def _coverage(observations: Observations) -> Lack | None:
     missing = [where for where in REGIONS if where not in reached]
     if not missing:
         return None
-    names = ", ".join(REGIONS[where] for where in missing)
+    names = ", ".join(REGIONS[where] for where in missing) if reached else "all of it"
 
     def helps(camera: Camera, board: Board, pose: Pose) -> bool:
         pixels = camera.project(pose.transform(board.points))
         return not _reached(pixels, camera.image_size).isdisjoint(missing)
 
-    return Lack("coverage", f"bring the board to where none was in the image: {names}", helps)
+    return Lack("coverage", f"bring the board to the parts of the image where none was: {names}", helps)
 
 
 def _reached(pixels: Pixels, image_size: tuple[int, int]) -> set[tuple[int, int]]:

@@ -17,11 +17,12 @@ STEPS = 200  # points drawn along an outline
 
 
 def described(camera: Camera, board: Board, pose: Pose) -> str:
-    """Such as ``vertical, in the upper left, 1.80 m away, its right side turned away by 35 degrees``."""
+    """Such as ``vertical, in the middle of the image, 1.80 m away, its right side turned away by 35 degrees``."""
     middle = camera.project(pose.transform(board.points.mean(axis=0)[None]))[0]
     column, row = np.digitize(np.nan_to_num(middle / np.array(camera.image_size), nan=0.5), [0.42, 0.58])
+    region = REGIONS[int(column), int(row)]
     return (
-        f"{held(board, pose)}, in the {REGIONS[int(column), int(row)]} of the image, "
+        f"{held(board, pose)}, in the {region}{'' if region == 'middle' else ' part'} of the image, "
         f"{range_of(board, pose):.2f} m away, its {tilted_side(board, pose)} turned away by {pose.tilt_deg:.0f} degrees"
     )
 

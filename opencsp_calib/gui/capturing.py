@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
+from opencsp_calib.errors import InputError
 from opencsp_calib.gui.camera import SHOWN_PX, LiveCamera
 from opencsp_calib.gui.controls import action, choice, field, quiet_action
 from opencsp_calib.gui.files import within
@@ -49,15 +50,19 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         return lambda value: asked.update({name: value})
 
     async def start() -> None:
-        folder = within(page.session.folder, asked["folder"])
-        count = int(asked["count"]) if asked["count"].isdecimal() else 50
+        try:
+            folder = within(page.session.folder, asked["folder"])
+            count = _number(asked["count"])
+        except InputError as error:
+            page.session.say(str(error), "bad")
+            return
         await camera.start(
             folder=str(folder),
             board=page.session.settings.spec,
             source=asked["source"],
             device=asked["device"] or None,
             release=asked["release"],
-            count=max(1, count),
+            count=count,
             settings=[line.strip() for line in asked["set"].splitlines() if line.strip()],
         )
 
@@ -98,6 +103,12 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         on.set_enabled(taken and not camera.running and not page.session.busy)
 
     return refresh
+
+
+def _number(text: str) -> int:
+    if not (text.strip().isdecimal() and int(text) > 0):
+        raise InputError(f"the number of photographs must be a whole number, such as 50, not {text!r}")
+    return int(text)
 
 
 def _gauges(camera: LiveCamera) -> Callable[[], None]:
