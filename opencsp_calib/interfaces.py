@@ -176,8 +176,8 @@ class KeepsNotes(Protocol):
 class ImageSource(Provided, Protocol):
     """Delivers images: a camera, or a folder that another program fills.
 
-    What it knows of an image, such as exposure and binning, goes into `Image.record`. What a person should know while it
-    works goes to a logger below ``opencsp_calib``: what it has set in the camera, a cable that is pulled.
+    What it knows of an image, such as exposure and binning, goes into `Image.record`. What a person should know while
+    it works goes to a logger below ``opencsp_calib``: what it has set in the camera, a cable that is pulled.
     """
 
     def devices(self) -> Sequence[str]:

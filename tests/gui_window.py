@@ -14,6 +14,11 @@ SCREENSHOTS = os.environ.get("OPENCSP_CALIB_SCREENSHOTS")
 """A folder to put a picture of every step into."""
 
 
+def run_cli(*arguments: object) -> None:
+    """The command line, which must succeed."""
+    subprocess.run([sys.executable, "-m", "opencsp_calib", *map(str, arguments)], check=True, capture_output=True)
+
+
 class Server:
     """``opencsp-calib gui`` in a process of its own."""
 
@@ -64,7 +69,7 @@ class Window:
             time.sleep(0.05)
 
     def type(self, testid: str, text: str) -> None:
-        field = self.element(testid)
+        field = self.until(lambda: self.element(testid))
         field.clear()
         field.send_keys(text)
 
@@ -77,6 +82,31 @@ class Window:
         button = f"//button[normalize-space()='{words}']"
         self.until(lambda: self.browser.find_element("xpath", button).is_enabled())
         self.browser.find_element("xpath", button).click()
+
+    def find_all(self, selector: str) -> list[Any]:
+        return list(self.browser.find_elements("css selector", selector))
+
+    def text_is_there(self, text: str) -> bool:
+        return text in str(self.browser.find_element("tag name", "body").text)
+
+    def row(self, testid: str, index: int) -> Any:
+        return self.find_all(f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr")[index]
+
+    def rows(self, testid: str) -> list[list[str]]:
+        """The words in a table, but for the cells of its checkboxes; long tables have fillers for rows out of sight."""
+        rows = self.find_all(f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr")
+        return [[cell.text for cell in row.find_elements("css selector", "td")[1:]] for row in rows]
+
+    def tab(self, name: str) -> None:
+        """Bring a tab to the front."""
+        self.browser.find_element("xpath", f"//*[@role='tab' and normalize-space()='{name}']").click()
+
+    def choose(self, label: str, words: str) -> None:
+        """Take one of the choices of a field."""
+        self.browser.find_element("css selector", f".q-select input[aria-label='{label}']").click()
+        option = f"//*[@role='option' and normalize-space()='{words}']"
+        self.until(lambda: self.browser.find_element("xpath", option).is_displayed())
+        self.browser.find_element("xpath", option).click()
 
     def enabled(self, testid: str) -> bool:
         return bool(self.element(testid).is_enabled())

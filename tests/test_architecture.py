@@ -35,7 +35,7 @@ TIERS = (
     "looking conformance",
     "journal cluster",
     "detecting",
-    "pipeline demo",
+    "pipeline demo camera_files",
     "trials validate check coach fleet",
     "capture",
     "report",

@@ -11,12 +11,9 @@ from opencsp_calib.cli.camera_files import (
     CameraName,
     FromFormat,
     ImageSize,
-    calibration_in,
     camera_in,
-    imported_from,
-    record_in,
 )
-from opencsp_calib.cli.console import print_json, say, say_problems, say_table
+from opencsp_calib.cli.console import print_json, progress_bar, say, say_problems, say_table
 from opencsp_calib.errors import InputError
 
 
@@ -28,20 +25,18 @@ def show(
     json: args.Json = False,
 ) -> None:
     """Show a camera file: parameters with their sigmas, the record kept with it, and what to know about it."""
-    from opencsp_calib.importing import exact
+    from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.summary import camera_as_json, parameter_lines
 
-    _, imported = imported_from(file, camera, from_format, image_size)
-    calibration = calibration_in(file)
+    opened = read_camera_file(file, camera, from_format, image_size)
+    calibration, record, shown = opened.calibration, opened.record, opened.camera
     sigma = calibration.sigma if calibration else None
-    record = record_in(file)
-    shown = exact(imported)
     size = "x".join(map(str, shown.image_size))
     say(f"{shown.name}: {shown.model}, {size}")
     say_table(("parameter", "value", "±1 sigma"), parameter_lines(shown, sigma, record))
     for key, value in record.items():
         say(f"{key}: {value}")
-    say_problems(imported.notes)
+    say_problems(opened.imported.notes)
     if calibration:
         from opencsp_calib.judgement import judge
 
@@ -104,20 +99,13 @@ def undistort(
     image_size: ImageSize = None,
 ) -> None:
     """Remove the lens distortion from images; they come out as a pinhole camera would have taken them."""
-    from opencsp_calib.images import find_images, read_image, write_image
+    from opencsp_calib.camera_files import undistort_images
+    from opencsp_calib.images import find_images
 
     lens = camera_in(camera, name, image_size)
     files = find_images(images)
-    if output.exists() and not output.is_dir():
-        raise InputError(f"{output} is a file; give a folder")
-    inputs = {file.path.absolute().parent for file in files}
-    if output.absolute() in inputs:
-        raise InputError(f"{output} holds the photographs themselves; give another folder")
-    output.mkdir(parents=True, exist_ok=True)
-    for file in files:
-        target = output / Path(file.name).with_suffix(".png")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_image(lens.undistort(read_image(file).pixels), target)
+    with progress_bar("Undistorting") as advance:
+        undistort_images(lens, files, output, advance)
     say(f"{len(files)} images saved in {output}")
 
 

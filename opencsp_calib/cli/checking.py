@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize, calibration_in, camera_in
+from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize, camera_in
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud
 from opencsp_calib.errors import FileFormatError, InputError
@@ -61,6 +61,7 @@ def check(
 ) -> None:
     """Check whether a camera is still good for photographs it has not seen."""
     from opencsp_calib import pipeline
+    from opencsp_calib.camera_files import calibration_in
     from opencsp_calib.check import check as checked
 
     known = camera_in(camera, name, image_size)

@@ -1,26 +1,14 @@
 """The commands that convert camera files and list their formats."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.camera_files import (
-    CameraName,
-    FromFormat,
-    ImageSize,
-    imported_from,
-    record_in,
-    size_from,
-)
+from opencsp_calib.cli.camera_files import CameraName, FromFormat, ImageSize
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.errors import InputError
-
-if TYPE_CHECKING:
-    from opencsp_calib.camera import Camera
-    from opencsp_calib.detection import Problem
-    from opencsp_calib.lens_fit import LensFit
 
 Fit = Annotated[
     str | None, typer.Option("--fit", metavar="MODEL", help="Approximate a camera that is not exactly one of ours.")
@@ -47,38 +35,32 @@ def convert(
     json: args.Json = False,
 ) -> None:
     """Convert a camera file from one program's format to another's: exactly, or by a fit that says its error."""
-    from dataclasses import replace
-
+    from opencsp_calib import camera_files
     from opencsp_calib.atomic import check_writable
-    from opencsp_calib.importing import exact, fitted
     from opencsp_calib.summary import camera_as_json
 
     out = Path(source) if params is not None and target is None else target
     if out is None or (params is not None and target is not None):
         raise InputError("convert takes IN and OUT, or with --params only OUT")
     check_writable(out)
-    found: LensFit | None = None
-    record: dict[str, str] = {}
     if params is not None:
-        converted = typed_camera(params, model, image_size, name or out.stem)
+        typed = camera_files.typed_camera(params, model, image_size, name or out.stem)
+        converted = camera_files.Converted(typed, {})
     else:
-        key, imported = imported_from(Path(source), camera, from_format, image_size)
-        say_problems(imported.notes)
-        record = record_in(Path(source)) | _noted(imported.notes)
-        if fit is not None:
-            found = fitted(imported, fit, **args.given(accept_error_px=accept_error, name=name or key))
-            record["import fit"] = f"{fit}, {found}"
-            say(f"fitted {record['import fit']}")
-            converted = found.camera
-        else:
-            converted = exact(imported)
-    converted = replace(converted, name=name) if name else converted
-    write_camera_file(converted, out, to_format, record)
+        opened = camera_files.read_camera_file(source, camera, from_format, image_size)
+        say_problems(opened.imported.notes)
+        converted = camera_files.convert(opened, fit, accept_error, name)
+    found = converted.fit
+    if found:
+        say(f"fitted {converted.record['import fit']}")
+    warning = camera_files.write_camera_file(converted.camera, out, to_format, converted.record)
     say(f"camera saved: {out}")
+    if warning:
+        say(f"warning [notes-not-stored] {warning}")
     if json:
         keys = ("rms_px", "worst_px", "coverage")
         fit_as_json = {key: getattr(found, key) for key in keys} if found else None
-        print_json({"camera": camera_as_json(converted), "fit": fit_as_json, "output": str(out)})
+        print_json({"camera": camera_as_json(converted.camera), "fit": fit_as_json, "output": str(out)})
 
 
 def formats(json: args.Json = False) -> None:
@@ -100,62 +82,3 @@ def formats(json: args.Json = False) -> None:
 
 
 COMMANDS = (convert, formats)
-
-
-def typed_camera(params: str, model: str | None, image_size: str | None, name: str) -> "Camera":
-    """What ``--params`` says, with ``--model`` and ``--image-size``."""
-    from opencsp_calib.camera import Camera
-    from opencsp_calib.models import lens_model
-
-    size = size_from(image_size)
-    if model is None or size is None:
-        raise InputError("--params needs --model and --image-size too")
-    names = lens_model(model).parameter_names
-    values = dict(_typed_number(pair) for pair in params.split(","))
-    missing, unknown = [n for n in names if n not in values], [n for n in values if n not in names]
-    if missing or unknown:
-        what = f"lacks {', '.join(missing)}" if missing else f"has {', '.join(unknown)}, which it should not"
-        raise InputError(f"--params {what}; {model} has {', '.join(names)}")
-    return Camera(name, model, [values[n] for n in names], size)  # type: ignore[arg-type]  # made an array there
-
-
-def write_camera_file(camera: "Camera", path: Path, to_format: str | None, record: dict[str, str]) -> None:
-    """Write a camera in the format named, or that its extension means, with the record where there is room for it."""
-    from opencsp_calib.interfaces import KeepsNotes
-    from opencsp_calib.registry import installed
-
-    writers = {name: f for name, f in installed().camera_formats.items() if f.writes}
-    if to_format is not None and to_format not in writers:
-        raise InputError(
-            f"no format that can be written is called {to_format!r}; there are {', '.join(sorted(writers))}"
-        )
-    if to_format is None:
-        fitting = [name for name, f in sorted(writers.items()) if path.suffix.lower() in f.extensions]
-        if len(fitting) != 1:
-            choice = ", ".join(fitting or sorted(writers))
-            raise InputError(f"which format {path.name} should have cannot be told; add --to with one of {choice}")
-        to_format = fitting[0]
-    writer = writers[to_format]
-    if record and isinstance(writer, KeepsNotes):
-        writer.write_with_notes({camera.name: camera}, path, record)
-        return
-    writer.write({camera.name: camera}, path)
-    if record:
-        say(f"warning [notes-not-stored] {writer.title} has no room for notes; keep them yourself")
-
-
-def _typed_number(pair: str) -> tuple[str, float]:
-    name, _, value = pair.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise InputError(f"--params takes NAME=NUMBER, such as fx=2710.0, not {pair.strip()!r}") from None
-
-
-def _noted(notes: "tuple[Problem, ...]") -> dict[str, str]:
-    """Notes by their code, all messages of one code together."""
-    found: dict[str, str] = {}
-    for note in notes:
-        key = f"import {note.code}"
-        found[key] = f"{found[key]}; {note.message}" if key in found else note.message
-    return found

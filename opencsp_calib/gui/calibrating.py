@@ -1,17 +1,26 @@
-"""Step 4: calibrating, the rms, and the ways to look at the result."""
+"""Step 4: calibrating, the rms, the five worst, and the ways to look at the result."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from nicegui import ui
 
+from opencsp_calib.gui.choosing import fill, photograph_table
 from opencsp_calib.gui.controls import action, quiet_action
-from opencsp_calib.gui.procedure import calibrate
+from opencsp_calib.gui.procedure import calibrate, put_back, remove
+from opencsp_calib.gui.session import Session
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
 __all__ = ["build"]
+
+WORST = 5
+COLUMNS: list[dict[str, Any]] = [
+    {"name": "image", "label": "The five worst", "field": "image", "align": "left"},
+    {"name": "rms", "label": "rms (px)", "field": "rms"},
+]
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -30,11 +39,57 @@ def build(page: "Page") -> Callable[[], None]:
         quiet_action("Show reprojection error", lambda: page.show_result("Reprojection error"), "reprojection-error"),
         quiet_action("Visualize distortion", lambda: page.show_result("Distortion"), "visualize-distortion"),
     ]
+    worst = photograph_table(page, COLUMNS).props("data-testid=worst-images").classes("worst")
+    change = _changing(page)
 
     def refresh() -> None:
+        solved = session.calibration
         solve.set_enabled(session.can_calibrate)
-        rms.set_text(f"{session.calibration.rms_px:.4f} px" if session.calibration else "not yet known")
+        rms.set_text(f"{solved.rms_px:.4f} px" if solved else "not yet known")
+        fill(page, worst, _worst(session))
+        worst.set_visibility(solved is not None)
         for look in looks:
-            look.set_enabled(session.calibration is not None)
+            look.set_enabled(solved is not None)
+        change()
 
     return refresh
+
+
+def _changing(page: "Page") -> Callable[[], None]:
+    """The buttons that leave photographs out, and take them in again."""
+    session = page.session
+
+    def begin(change: Callable[[Session, set[str]], None], which: Callable[[], set[str]]) -> None:
+        names = which()
+        page.selected -= names
+        page.show_result("Result")
+        change(session, names)
+
+    def used() -> set[str]:
+        return {name for name in page.selected - session.removed if session.views.get(name, {}).get("status") == "used"}
+
+    def removed() -> set[str]:
+        return page.selected & session.removed
+
+    out = quiet_action("Remove and recalibrate", lambda: begin(remove, used), "remove")
+    again = quiet_action("Put back", lambda: begin(put_back, removed), "put-back")
+    told = ui.label().classes("hint")
+
+    def refresh() -> None:
+        out.set_enabled(bool(used()) and session.can_calibrate)
+        again.set_enabled(bool(removed()) and session.can_calibrate)
+        for button in (out, again):
+            button.set_visibility(session.calibration is not None)
+        told.set_visibility(bool(session.removed))
+        told.set_text(f"Left out: {', '.join(sorted(session.removed))}")
+
+    return refresh
+
+
+def _worst(session: Session) -> list[dict[str, Any]]:
+    solved = session.calibration
+    if solved is None:
+        return []
+    order = np.argsort(-np.nan_to_num(solved.view_rms_px))[:WORST]
+    names = [view.image for view in solved.observations.used]
+    return [{"image": names[index], "rms": f"{solved.view_rms_px[index]:.4f}"} for index in order]

@@ -23,6 +23,8 @@ def field(label: str, value: str, on_change: Callable[[str], Any], testid: str =
     """A line to type into; the test id is that of the ``input`` element itself."""
     made = ui.input(label, value=value, on_change=lambda event: on_change(event.value or ""))
     made.props("outlined dense autocomplete=off").classes("field")
+    # what sets the value without typing (a browser's own filling in, a test's clear) tells of it by this event only
+    made.on("change", js_handler=f"(value) => {{ getElement({made.id}).inputValue = value ?? ''; }}")
     if hint:
         made.props["placeholder"] = hint
     return made.props(f"data-testid={testid}") if testid else made

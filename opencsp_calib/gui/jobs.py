@@ -44,7 +44,9 @@ def _listen(asked: "queue.Queue[dict[str, Any]]") -> None:
 
 
 def _load() -> None:
-    """Load beforehand what a job will need."""
+    """Load beforehand what a job will need; and leave the page what it needs of the processor."""
+    if hasattr(os, "nice"):
+        os.nice(5)
     from opencsp_calib import pipeline  # noqa: F401
     from opencsp_calib.corners import prepare
     from opencsp_calib.registry import installed
@@ -81,22 +83,80 @@ def find_corners(
 
 
 def solve(
-    tell: Tell,
-    observations: str,
-    exclude: list[str],
-    options: dict[str, Any],
-    guess: str | None,
-    calibration: str,
+    tell: Tell, observations: str, exclude: list[str], options: dict[str, Any], guess: str, calibration: str
 ) -> None:
     """Solve for the camera, without the images to be excluded; writes a camera file."""
     from opencsp_calib import dropping, pipeline
+    from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.hdf5_calibration import load_observations, save_calibration
 
+    if guess:
+        options["guess"] = read_camera_file(guess).camera
     observed = dropping.excluding(load_observations(observations), exclude)
     save_calibration(pipeline.solve(observed, **options), calibration)
 
 
-JOBS: dict[str, Callable[..., Any]] = {"find_corners": find_corners, "solve": solve}
+def validate(tell: Tell, calibration: str, sections: str) -> str:
+    """Put a calibration to every test there is; writes what came of it as HTML, gives the verdict."""
+    from opencsp_calib.atomic import replacing
+    from opencsp_calib.hdf5_calibration import load_calibration
+    from opencsp_calib.registry import installed
+    from opencsp_calib.report import validation_sections
+    from opencsp_calib.validate import validate as validated
+
+    found = validated(load_calibration(calibration), installed().solvers)
+    with replacing(sections) as temporary:
+        temporary.write_text("".join(validation_sections(found)), encoding="utf-8")
+    return found.verdict
+
+
+def report(tell: Tell, calibration: str, before: str, target: str) -> None:
+    """Write the report of a calibration."""
+    from opencsp_calib.hdf5_calibration import load_calibration
+    from opencsp_calib.report import write_report
+
+    write_report(load_calibration(calibration), target, before=load_calibration(before) if before else None)
+
+
+def check(tell: Tell, camera: str, images: list[str], board: str) -> dict[str, Any]:
+    """Hold a camera file against photographs; the board is by default that which it was calibrated with."""
+    from opencsp_calib import pipeline
+    from opencsp_calib.camera_files import read_camera_file
+    from opencsp_calib.check import check as checked
+    from opencsp_calib.detection import View
+    from opencsp_calib.errors import InputError
+
+    def progress(done: int, total: int, _: View) -> None:
+        tell({"done_images": done, "total": total})
+
+    opened = read_camera_file(camera)
+    known, calibration = opened.camera, opened.calibration
+    if not (board or calibration):
+        raise InputError("describe the board under Calibrate first: this camera file does not tell which it was")
+    target = pipeline.board_from(board) if board or calibration is None else calibration.observations.board
+    seen = pipeline.detect(images, target, progress=progress)
+    covariance = calibration.covariance if calibration else None
+    found = checked(known, seen, lambda views: pipeline.solve(views, known.model), covariance=covariance)
+    notes = [problem.message for problem in found.problems]
+    return found.as_json() | {"name": known.name, "reasons": [*found.reasons, *notes]}
+
+
+def undistort(tell: Tell, camera: str, images: list[str], folder: str) -> None:
+    """Write photographs without their lens distortion into another folder."""
+    from pathlib import Path
+
+    from opencsp_calib.camera_files import read_camera_file, undistort_images
+    from opencsp_calib.images import find_images
+
+    def progress(done: int, total: int) -> None:
+        tell({"done_images": done, "total": total})
+
+    undistort_images(read_camera_file(camera).camera, find_images(images), Path(folder), progress)
+
+
+JOBS: dict[str, Callable[..., Any]] = {
+    job.__name__: job for job in (find_corners, solve, validate, report, check, undistort)
+}
 
 if __name__ == "__main__":
     main()

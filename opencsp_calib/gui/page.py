@@ -13,7 +13,26 @@ from typing import TypeAlias
 from nicegui import ui
 
 from opencsp_calib.errors import CalibError
-from opencsp_calib.gui import board_fields, calibrating, capturing, corners, photographs, saving, status, views
+from opencsp_calib.gui import (
+    board_fields,
+    board_shape,
+    calibrating,
+    capturing,
+    corners,
+    cross_validation,
+    distortion,
+    existing,
+    photographs,
+    poses,
+    printing,
+    reprojection,
+    result,
+    saving,
+    status,
+    uncertainty,
+    viewer,
+    views,
+)
 from opencsp_calib.gui.session import Session
 
 __all__ = ["Page", "show"]
@@ -28,8 +47,23 @@ STEPS: tuple[tuple[str, Build], ...] = (
     ("Calibration", calibrating.build),
     ("Save", saving.build),
 )
-RESULTS: tuple[tuple[str, Build], ...] = (("Photographs", views.build),)
-TABS: tuple[tuple[str, Build], ...] = (("Capture", capturing.build),)
+RESULTS: tuple[tuple[str, Build], ...] = (
+    ("Photographs", views.build),
+    ("Found corners", viewer.build),
+    ("Result", result.build),
+    ("Reprojection error", reprojection.build),
+    ("Distortion", distortion.build),
+    ("Poses", poses.build),
+    ("Board shape", board_shape.build),
+    ("Uncertainty", uncertainty.build),
+    ("Cross-validation", cross_validation.build),
+)
+TABS: tuple[tuple[str, Build], ...] = (
+    ("Capture", capturing.build),
+    ("Existing camera", existing.build),
+    ("Print a board", printing.build),
+)
+BEFORE_CALIBRATION = ("Photographs", "Found corners")
 
 
 class Page:
@@ -37,8 +71,12 @@ class Page:
 
     def __init__(self, session: Session) -> None:
         self.session = session
+        self.image = ""
+        """The photograph that is looked at."""
         self.selected: set[str] = set()
+        """Photographs that are selected in the tables, to be removed or put back."""
         self._refreshers: dict[str, Refresh] = {}
+        self._seldom: dict[str, Refresh] = {}
         self._always: list[Refresh] = []
 
     def show_result(self, name: str) -> None:
@@ -48,11 +86,18 @@ class Page:
     @property
     def tab(self) -> str:
         """Which tab is shown: ``Calibrate``, or one of `TABS`."""
-        return str(self._tabs.value)
+        return str(self._pages.value)
 
     def show_tab(self, name: str) -> None:
         """Bring a tab to the front."""
-        self._tabs.set_value(name)
+        self._pages.set_value(name)
+
+    def look_at(self, image: str) -> None:
+        """Open a photograph with its corners."""
+        if self.session.observations and image in {view.image for view in self.session.observations.views}:
+            self.image = image
+            self.show_result("Found corners")
+            self.refresh()
 
     def attempt(self, action: Callable[[], None]) -> None:
         """Do what a person asked for; what is wrong with it goes into the status."""
@@ -66,16 +111,17 @@ class Page:
         with ui.element("header").classes("head"):
             ui.label("Camera calibration").classes("title")
             ui.label(str(self.session.folder)).classes("quiet path")
-            with ui.tabs().props("no-caps dense inline-label").classes("pages") as tabs:
-                for name, _ in (("Calibrate", None), *TABS):
+            with ui.tabs().props("no-caps dense inline-label").classes("pages") as self._pages:
+                for name in ("Calibrate", *dict(TABS)):
                     ui.tab(name)
             _theme_button()
-        with ui.tab_panels(tabs, value="Calibrate", animated=False).classes("panels body") as self._tabs:
+        with ui.tab_panels(self._pages, value="Calibrate", animated=False).classes("panels body"):
             with ui.tab_panel("Calibrate").classes("bare"):
                 self._build_calibrate()
             for name, build in TABS:
                 with ui.tab_panel(name).classes("page"):
-                    self._always.append(build(self))
+                    self._seldom[name] = build(self)
+        self._pages.on_value_change(self.refresh)
         with ui.element("footer").classes("foot"):
             self._always.append(status.build(self))
 
@@ -88,8 +134,7 @@ class Page:
                         self._always.append(build(self))
             with ui.element("main").classes("results"):
                 with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
-                    for name, _ in RESULTS:
-                        ui.tab(name)
+                    self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
                 with ui.tab_panels(self._results, value=RESULTS[0][0], animated=False).classes("panels"):
                     for name, build in RESULTS:
                         with ui.tab_panel(name).classes("bare"):
@@ -100,14 +145,19 @@ class Page:
         """Bring what can be seen up to date."""
         for refresh in self._always:
             refresh()
+        for name, tab in self._tabs.items():
+            tab.set_enabled(name in BEFORE_CALIBRATION or self.session.calibration is not None)
         self._refreshers[str(self._results.value)]()
+        if self._pages.value in self._seldom:
+            self._seldom[self._pages.value]()
 
 
 def show(session: Session) -> None:
     """Build the page for one more tab of a browser."""
     ui.colors(primary="#0b6e99", positive="#1c7c4a", negative="#b3261e", warning="#9a6200")
     style = files("opencsp_calib.gui").joinpath("style.css").read_text(encoding="utf-8")
-    ui.add_css(style)
+    report = files("opencsp_calib.report").joinpath("style.css").read_text(encoding="utf-8")
+    ui.add_css(f".report {{ {report} }} {style}")
     ui.add_body_html("<script>history.replaceState(null, '', location.pathname + location.hash)</script>")
     page = Page(session)
     page.build()

@@ -77,5 +77,5 @@ def _folder_field(page: "Page") -> None:
         page.attempt(take)
 
     with ui.element("div").classes("with-button"):
-        folder = field("or a folder here", "", lambda _: None).on("keydown.enter", use)
+        folder = field("or a folder here", "", lambda _: None, "photograph-folder").on("keydown.enter", use)
         ui.button("Use", on_click=use).props("no-caps flat dense")

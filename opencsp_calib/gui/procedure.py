@@ -4,11 +4,14 @@ from collections.abc import Iterable
 from functools import partial
 
 from opencsp_calib.gui.files import within
-from opencsp_calib.gui.news import Message
+from opencsp_calib.gui.news import Level, Message
 from opencsp_calib.gui.session import Session
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations
+from opencsp_calib.judgement import verdict
 
 __all__ = ["calibrate", "find_and_calibrate", "find_corners", "put_back", "remove"]
+
+LEVELS: dict[str, Level] = {"good": "good", "doubt": "info", "bad": "bad"}
 
 
 def find_corners(session: Session) -> None:
@@ -83,5 +86,6 @@ async def _calibrate(session: Session) -> None:
         target.replace(session.file("before"))
     new.replace(target)
     session.before, session.calibration = session.calibration, load_calibration(target)
-    used = len(session.calibration.observations.used)
-    session.message = Message(f"Calibrated from {used} views: rms {session.calibration.rms_px:.4f} px.", "good")
+    used, judged = len(session.calibration.observations.used), verdict(session.calibration)
+    text = f"Calibrated from {used} views, rms {session.calibration.rms_px:.4f} px. {judged.sentence}"
+    session.message = Message(text, LEVELS[judged.level])

@@ -10,11 +10,11 @@ from fastapi import APIRouter, HTTPException, Request, Response
 from fastapi.responses import FileResponse
 
 from opencsp_calib.errors import CalibError, InputError
-from opencsp_calib.gui.files import file_name
+from opencsp_calib.gui.files import file_name, within
 from opencsp_calib.gui.session import Session
 from opencsp_calib.images import MAX_BYTES, ImageFile, encode_thumbnail, read_image
 
-__all__ = ["routes"]
+__all__ = ["WHOLE_PX", "routes"]
 
 THUMBNAIL_PX = 320
 WHOLE_PX = 100_000
@@ -23,8 +23,12 @@ WHOLE_PX = 100_000
 def routes(session: Session) -> APIRouter:
     """The addresses, for one session."""
     router = APIRouter()
-    at_once = asyncio.Semaphore(2)  # photographs in memory
+    _incoming(router, session)
+    _outgoing(router, session)
+    return router
 
+
+def _incoming(router: APIRouter, session: Session) -> None:
     @router.put("/photographs")
     async def take(request: Request, name: str, batch: str, count: int) -> dict[str, str]:
         try:
@@ -36,6 +40,18 @@ def routes(session: Session) -> APIRouter:
             if session.selection.received(batch, count):
                 session.end_batch(batch)
             session.tell_soon()
+
+    @router.put("/cameras")
+    async def take_camera(request: Request, name: str) -> dict[str, str]:
+        try:
+            saved = await _saved(request.stream(), session.own / "cameras", file_name(name, "camera"))
+        except (InputError, OSError) as error:
+            raise HTTPException(507, str(error)) from None
+        return {"path": f"{session.own.name}/cameras/{saved}"}
+
+
+def _outgoing(router: APIRouter, session: Session) -> None:
+    at_once = asyncio.Semaphore(2)  # photographs in memory
 
     @router.get("/photographs")
     async def give(image: str, side: int = THUMBNAIL_PX) -> Response:
@@ -49,14 +65,15 @@ def routes(session: Session) -> APIRouter:
                 raise HTTPException(404, str(error)) from None
         return Response(data, media_type="image/jpeg", headers={"cache-control": "private, max-age=60"})
 
-    @router.get("/camera")
-    async def camera() -> Response:
-        if session.calibration is None:
+    @router.get("/files")
+    async def download(path: str) -> Response:
+        try:
+            wanted = within(session.folder, path)
+        except InputError as error:
+            raise HTTPException(403, str(error)) from None
+        if not wanted.is_file():
             raise HTTPException(404)
-        name = file_name(session.calibration.camera.name, "camera")
-        return FileResponse(session.file("calibration"), filename=f"{name}.h5", media_type="application/x-hdf5")
-
-    return router
+        return FileResponse(wanted, filename=wanted.name, media_type="application/octet-stream")
 
 
 async def _saved(chunks: AsyncIterator[bytes], folder: Path, name: str) -> str:

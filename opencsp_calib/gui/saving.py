@@ -1,42 +1,89 @@
-"""Step 5: saving the camera, to a place below DIR and as a download."""
+"""Step 5: saving the camera, to a place below DIR and as a download: HDF5, the report, or another program's format."""
 
+import asyncio
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import quote
 
 from nicegui import ui
 
-from opencsp_calib.gui.controls import action, field
-from opencsp_calib.gui.files import file_name, within
+from opencsp_calib.atomic import check_writable
+from opencsp_calib.camera_files import write_camera_file
+from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.gui.asking import may_write
+from opencsp_calib.gui.controls import action, choice, field
+from opencsp_calib.gui.files import file_name, shown, within
+from opencsp_calib.gui.news import Message
+from opencsp_calib.gui.session import Session
+from opencsp_calib.hdf5_calibration import save_calibration
+from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
-__all__ = ["build"]
+__all__ = ["build", "writable_formats"]
+
+HDF5, REPORT = "hdf5", "report"
+OURS = "opencsp"
+"""The format that is offered as HDF5, with the calibration in it."""
 
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    place = field("Save as, below DIR", "", lambda _: None, hint="camera.h5")
-    download = ui.checkbox("Download it too", value=True)
+    kinds = {HDF5: "Camera file (HDF5)", REPORT: "Report (HTML)", **writable_formats()}
+    kind = choice("What", kinds, HDF5, lambda _: refresh())
+    place = field("Save as", "", lambda _: None, "save-as", "camera.h5")
+    download = ui.checkbox("Download it too", value=True).props("dense")
+
+    def suffix() -> str:
+        ours = {HDF5: ".h5", REPORT: ".html"}
+        return ours.get(kind.value) or installed().camera_formats[kind.value].extensions[0]
+
+    def target() -> Path:
+        name = place.value.strip() or file_name(session.settings.camera_name, "camera")
+        return within(session.folder, name if Path(name).suffix else name + suffix())
 
     async def save() -> None:
-        name = place.value.strip() or default()
-        page.attempt(lambda: session.save_camera(target(name)))
-        if download.value:
-            ui.download.from_url("camera")
-
-    def target(name: str) -> Path:
-        return within(session.folder, name if Path(name).suffix else f"{name}.h5")
-
-    def default() -> str:
-        return file_name(session.settings.camera_name, "camera") + ".h5"
+        try:
+            path = target()
+            check_writable(path)
+            if path in {file.path.resolve() for file in session.selection.files}:
+                raise InputError(f"{path.name} is one of the photographs; give another name")
+            if not await may_write(path):
+                return
+            if await session.start(f"Saving {path.name}", partial(_save, session, kind.value, path)) and download.value:
+                ui.download.from_url(f"files?path={quote(shown(session.folder, path))}")
+        except CalibError as error:
+            session.say(str(error), "bad")
 
     button = action("Save Camera", save, "save-camera")
 
     def refresh() -> None:
-        place.props["placeholder"] = default()
+        place.props["placeholder"] = file_name(session.settings.camera_name, "camera") + suffix()
         button.set_enabled(session.calibration is not None and not session.busy)
 
     return refresh
+
+
+def writable_formats() -> dict[str, str]:
+    """Other programs' formats that can be written here, by name, as people know them."""
+    known = sorted(installed().camera_formats.items())
+    return {name: f.title for name, f in known if f.writes and f.missing() is None and name != OURS}
+
+
+async def _save(session: Session, kind: str, path: Path) -> None:
+    calibration = session.calibration
+    if calibration is None:
+        raise InputError("calibrate first")
+    if kind == HDF5:
+        await asyncio.to_thread(save_calibration, calibration, path)
+    elif kind == REPORT:
+        kept, before = session.file("calibration"), session.file("before") if session.before else ""
+        await session.job("report", calibration=str(kept), before=str(before), target=str(path))
+    else:
+        await asyncio.to_thread(write_camera_file, calibration.camera, path, kind)
+    what = "Report" if kind == REPORT else "Camera"
+    session.message = Message(f"{what} saved: {shown(session.folder, path)}", "good")

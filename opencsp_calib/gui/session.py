@@ -35,7 +35,7 @@ from opencsp_calib.gui.news import Level, Message, Progress
 from opencsp_calib.gui.selection import Selection
 from opencsp_calib.gui.settings import Settings
 from opencsp_calib.gui.work import Worker
-from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_calibration
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 from opencsp_calib.initial import rough_tilts
 from opencsp_calib.summary import observations_as_json
 
@@ -73,7 +73,7 @@ class Session:
         self.message = Message("Describe the board and select photographs.")
         self._news: asyncio.TimerHandle | None = None
         self._writing: asyncio.TimerHandle | None = None
-        self._task: asyncio.Task[None] | None = None
+        self._works: set[asyncio.Task[bool]] = set()
         self._load()
 
     # --- what makes sense now ---
@@ -101,10 +101,11 @@ class Session:
 
     # --- what a person does ---
 
-    def choose(self, **values: Any) -> None:
-        """Change settings."""
-        self.settings = replace(self.settings, **values)
-        self.tell()
+    def choose(self, setting: str, value: Any) -> None:
+        """Change a setting."""
+        if getattr(self.settings, setting) != value:
+            self.settings = replace(self.settings, **{setting: value})
+            self.tell()
 
     def say(self, text: str, level: Level = "info") -> None:
         """Put a line in the status."""
@@ -124,21 +125,6 @@ class Session:
         """No more photographs of this batch of uploads will come."""
         if self.selection.end(batch):
             self.say(f"{len(self.selection.files)} photographs selected.")
-
-    def save_camera(self, target: Path) -> None:
-        """Write the camera file.
-
-        Raises
-        ------
-        InputError
-            If there is no calibration, or it cannot be written.
-        """
-        if self.calibration is None:
-            raise InputError("calibrate first")
-        if target in {file.path.resolve() for file in self.selection.files}:
-            raise InputError(f"{target.name} is one of the photographs; give another name")
-        save_calibration(self.calibration, target)
-        self.say(f"Camera saved: {shown(self.folder, target)}", "good")
 
     def cancel(self) -> None:
         """Stop the work that goes on."""
@@ -186,13 +172,18 @@ class Session:
 
     # --- the work ---
 
-    def start(self, what: str, work: Callable[[], Coroutine[Any, Any, None]], total: int = 0) -> None:
-        """Begin long work, unless some goes on; what goes wrong with it is said in the status."""
-        if self.busy:
-            return
-        self.progress = Progress(what, total=total)
-        self._task = asyncio.get_running_loop().create_task(self._run(work))
-        self.tell()
+    def start(self, what: str, work: Callable[[], Coroutine[Any, Any, None]], total: int = 0) -> asyncio.Task[bool]:
+        """Begin long work, unless some goes on; what goes wrong with it is said in the status.
+
+        Returns
+        -------
+        asyncio.Task
+            Gives whether it was done. Nobody need wait for it.
+        """
+        task = asyncio.get_running_loop().create_task(self._run(what, work, total))
+        self._works.add(task)  # the loop itself would forget it
+        task.add_done_callback(self._works.discard)
+        return task
 
     async def job(self, name: str, **arguments: Any) -> Any:
         """Have a job of `jobs.py` done, showing its progress; gives what came of it. To be called by work."""
@@ -206,11 +197,16 @@ class Session:
             result = answer.get("done")
         return result
 
-    async def _run(self, work: Callable[[], Coroutine[Any, Any, None]]) -> None:
+    async def _run(self, what: str, work: Callable[[], Coroutine[Any, Any, None]], total: int) -> bool:
+        if self.busy:
+            return False
+        self.progress = Progress(what, total=total)
+        self.tell()
         try:
             await work()
         except (CalibError, OSError) as error:
             self.message = Message(str(error), "bad")
+            return False
         except Exception as error:  # a defect of ours: said, and the window lives on
             self.message = Message(f"unexpected: {error!r}", "bad")
             raise
@@ -218,6 +214,7 @@ class Session:
             self.progress = None
             self.tell()
             await self.worker.start()  # ready again, if it was stopped
+        return True
 
     def asked(self) -> list[Any]:
         """What decides what is found."""

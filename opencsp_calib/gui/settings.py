@@ -11,7 +11,7 @@ from opencsp_calib.pipeline import DEFAULT_MODEL, DEFAULT_SOLVER
 from opencsp_calib.registry import installed
 from opencsp_calib.summary import PIXEL_PITCH, notes_from
 
-__all__ = ["Settings"]
+__all__ = ["BY_FIELDS", "Settings"]
 
 BY_FIELDS = ("checkerboard", "charuco")
 """Kinds of board that have fields of their own; any other is described in one line."""

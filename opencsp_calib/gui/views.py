@@ -6,6 +6,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
+from opencsp_calib.gui.choosing import fill, photograph_table
 from opencsp_calib.gui.session import Session
 
 if TYPE_CHECKING:
@@ -19,44 +20,55 @@ COLUMNS: list[dict[str, Any]] = [
     {"name": "status", "label": "Status", "field": "status", "align": "left", "sortable": True},
     {"name": "corners", "label": "Corners", "field": "corners", "sortable": True},
     {"name": "tilt", "label": "Tilt (°)", "field": "tilt", "sortable": True},
-    {"name": "edge", "label": "Edge width (px)", "field": "edge", "sortable": True},
+    {"name": "edge", "label": "Edges (px)", "field": "edge", "sortable": True},
     {"name": "rms", "label": "rms (px)", "field": "rms", "sortable": True},
     {"name": "problems", "label": "To know", "field": "problems", "align": "left", "classes": "wide"},
 ]
+PICTURE_CELL = '<q-td :props="props"><img class="thumbnail" loading="lazy" :src="props.row.picture" alt="" /></q-td>'
+START = (
+    "Describe the board on the left and select about 50 photographs of it: tilted by 30 to 45 degrees to every side, "
+    "half of them with the board turned by 90 degrees, together filling the whole image. Each photograph is listed "
+    "here with its corners, its tilt, how wide its edges are (sharp ones: 0.7 px) and what is to be known about it."
+)
 
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    table = ui.table(columns=COLUMNS, rows=[], row_key="image", pagination={"rowsPerPage": 0})
-    table.props("flat virtual-scroll hide-bottom data-testid=images").classes("views")
-    table.add_slot(
-        "body-cell-picture",
-        '<q-td :props="props"><img class="thumbnail" loading="lazy" :src="props.row.picture" alt="" /></q-td>',
-    )
+    table = photograph_table(page, COLUMNS).props("virtual-scroll data-testid=images").classes("views")
+    table.add_slot("body-cell-picture", PICTURE_CELL)
+    empty = ui.label(START).classes("quiet empty")
 
     def refresh() -> None:
-        rows = [_row(session, file.name) for file in session.selection.files]
-        if rows != table.rows:
-            table.rows = rows
+        names = [file.name for file in session.selection.files]
+        rms = _rms(session)
+        fill(page, table, [_row(session, name, rms) for name in names])
+        table.set_visibility(bool(names))
+        empty.set_visibility(not names)
 
     return refresh
 
 
-def _row(session: Session, image: str) -> dict[str, Any]:
+def _rms(session: Session) -> dict[str, float]:
+    solved = session.calibration
+    if solved is None:
+        return {}
+    return {view.image: float(rms) for view, rms in zip(solved.observations.used, solved.view_rms_px, strict=True)}
+
+
+def _row(session: Session, image: str, rms: dict[str, float]) -> dict[str, Any]:
     view = session.views.get(image, {})
-    status = view.get("status", "")
     return {
         "image": image,
         "picture": f"photographs?image={quote(image)}",
-        "status": status,
-        "corners": view.get("corners", "") if view else "",
-        "tilt": _digits(view.get("tilt_deg"), 0),
-        "edge": _digits(view.get("edge_width_px"), 2),
-        "rms": "",
+        "status": "left out" if image in session.removed else view.get("status", ""),
+        "corners": view.get("corners"),
+        "tilt": _rounded(view.get("tilt_deg"), 0),
+        "edge": _rounded(view.get("edge_width_px"), 2),
+        "rms": _rounded(rms.get(image), 4),
         "problems": "; ".join(problem["message"] for problem in view.get("problems", ())),
     }
 
 
-def _digits(value: float | None, digits: int) -> str:
-    return "" if value is None else f"{value:.{digits}f}"
+def _rounded(value: float | None, digits: int) -> str | None:
+    return None if value is None else f"{value:.{digits}f}"

@@ -2,6 +2,6 @@
 
 from opencsp_calib.report.page import write_report
 from opencsp_calib.report.plots import plot_difference
-from opencsp_calib.report.validation_page import write_validation
+from opencsp_calib.report.validation_page import validation_sections, write_validation
 
-__all__ = ["plot_difference", "write_report", "write_validation"]
+__all__ = ["plot_difference", "validation_sections", "write_report", "write_validation"]

@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.comparison import compare
 from opencsp_calib.judgement import REMARKS, Verdict, judge, verdict
 from opencsp_calib.quality import set_quality, view_qualities
 from opencsp_calib.report import plots
@@ -18,7 +19,7 @@ from opencsp_calib.report.photographs import photographs
 from opencsp_calib.report.trust_section import trust_section
 from opencsp_calib.summary import parameter_lines
 
-__all__ = ["write_report"]
+__all__ = ["changes", "distortion", "parameters", "residuals", "summary", "write_report"]
 
 
 def write_report(calibration: Calibration, path: str | os.PathLike[str], *, before: Calibration | None = None) -> None:
@@ -38,13 +39,13 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str], *, befo
         If it cannot be written.
     """
     sections = (
-        _summary(calibration),
-        _dropped(calibration, before),
-        _parameters(calibration),
+        summary(calibration),
+        changes(calibration, before),
+        parameters(calibration),
         _views_in_order(calibration),
-        _residuals(calibration),
+        residuals(calibration),
         _coverage_and_poses(calibration),
-        _distortion(calibration),
+        distortion(calibration),
         board_section(calibration),
         trust_section(calibration),
         _photographs(calibration),
@@ -53,7 +54,8 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str], *, befo
     write_document(f"Calibration of {calibration.camera.name}", sections, path)
 
 
-def _summary(calibration: Calibration) -> str:
+def summary(calibration: Calibration) -> str:
+    """The verdict, warnings, and the figures that matter most."""
     camera, whole = calibration.camera, set_quality(calibration)
     problems = judge(calibration)
     judged: Verdict = verdict(calibration)
@@ -83,23 +85,33 @@ def _summary(calibration: Calibration) -> str:
     )
 
 
-def _dropped(calibration: Calibration, before: Calibration | None) -> str:
+def changes(calibration: Calibration, before: Calibration | None) -> str:
+    """What other images changed, against the result before; empty without one."""
     if before is None:
         return ""
-    kept = {view.image for view in calibration.observations.used}
-    gone = [view.image for view in before.observations.used if view.image not in kept]
-    names = before.camera.lens.parameter_names
-    rows = [("rms (px)", f"{before.rms_px:.4f}", f"{calibration.rms_px:.4f}")]
-    rows += [
-        (name, f"{old:.6g}", f"{new:.6g}")
-        for name, old, new in zip(names, before.camera.params, calibration.camera.params, strict=True)
+    now, then = ({view.image for view in one.observations.used} for one in (calibration, before))
+    sentences = [
+        f"{len(names)} {what}: {escape(', '.join(sorted(names)))}."
+        for what, names in (("dropped", then - now), ("put back", now - then))
+        if names
     ]
-    return f"<h2>Dropped images</h2><p>{len(gone)} dropped: {escape(', '.join(gone))}</p>" + table(
-        ("", "before", "after"), rows
-    )
+    if calibration.camera.image_size == before.camera.image_size:
+        shift = compare(before.camera, calibration.camera)
+        sentences.append(
+            f"What the camera sees moved by {shift.rms_px:.2g} px rms over the image, {shift.worst_px:.2g} px at worst "
+            "(frames aligned)."
+        )
+    rows = [("rms (px)", f"{before.rms_px:.4f}", f"{calibration.rms_px:.4f}")]
+    if calibration.camera.model == before.camera.model:
+        names = before.camera.lens.parameter_names
+        pairs = zip(names, before.camera.params, calibration.camera.params, strict=True)
+        rows += [(name, f"{old:.6g}", f"{new:.6g}") for name, old, new in pairs]
+    title = "Dropped images" if then - now else "What changed"
+    return f"<h2>{title}</h2><p>{' '.join(sentences)}</p>" + table(("", "before", "after"), rows)
 
 
-def _parameters(calibration: Calibration) -> str:
+def parameters(calibration: Calibration) -> str:
+    """Each parameter with its standard deviation, and how they are correlated."""
     lines = parameter_lines(calibration.camera, calibration.sigma, calibration.record)
     notes = "".join(f"<li>{escape(key)}: {escape(value)}</li>" for key, value in calibration.record.items())
     known = bool(np.isfinite(calibration.covariance).all())
@@ -130,7 +142,8 @@ def _views_in_order(calibration: Calibration) -> str:
     )
 
 
-def _residuals(calibration: Calibration) -> str:
+def residuals(calibration: Calibration) -> str:
+    """Residuals over the image, and how they are spread."""
     return (
         "<h2>Residuals</h2>"
         + as_image(plots.residual_plot(calibration), "residuals over the image")
@@ -147,7 +160,8 @@ def _coverage_and_poses(calibration: Calibration) -> str:
     )
 
 
-def _distortion(calibration: Calibration) -> str:
+def distortion(calibration: Calibration) -> str:
+    """The distortion as arrows and as a map of its size."""
     return (
         "<h2>Distortion</h2>"
         + as_image(plots.distortion_plot(calibration.camera), "radial, tangential and total distortion")

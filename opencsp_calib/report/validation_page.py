@@ -10,7 +10,7 @@ from opencsp_calib.report.html import table
 from opencsp_calib.report.plots import difference_plot
 from opencsp_calib.validate import Validation
 
-__all__ = ["write_validation"]
+__all__ = ["validation_sections", "write_validation"]
 
 
 def write_validation(validation: Validation, path: str | os.PathLike[str]) -> None:
@@ -22,8 +22,13 @@ def write_validation(validation: Validation, path: str | os.PathLike[str]) -> No
         If it cannot be written.
     """
     name = validation.calibration.camera.name
-    sections = (_verdict(validation, name), _solvers(validation), _halves(validation), _models(validation))
-    write_document(f"Validation of {name}", sections, path)
+    write_document(f"Validation of {name}", validation_sections(validation), path)
+
+
+def validation_sections(validation: Validation) -> tuple[str, ...]:
+    """The sections of the page, HTML."""
+    name = validation.calibration.camera.name
+    return _verdict(validation, name), _solvers(validation), _halves(validation), _models(validation)
 
 
 def _verdict(validation: Validation, name: str) -> str:

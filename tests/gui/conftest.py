@@ -2,8 +2,6 @@
 
 import os
 import shutil
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -67,8 +65,3 @@ def window(chromium: Any, server: Server) -> Window:
     opened = Window(chromium, server)
     opened.open()
     return opened
-
-
-def run_cli(*arguments: object) -> None:
-    """The command line, which must succeed."""
-    subprocess.run([sys.executable, "-m", "opencsp_calib", *map(str, arguments)], check=True, capture_output=True)

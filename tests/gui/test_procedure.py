@@ -1,25 +1,40 @@
 """The seed's procedure from the first button to the last, on its own photographs, in a browser."""
 
+import shutil
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
-from gui_window import Window
+from gui_window import Window, run_cli
 
 pytestmark = pytest.mark.timeout(600)
+STEPS = ("find-corners", "view-corners", "calibrate", "reprojection-error", "visualize-distortion", "save-camera")
+BOARD = "checkerboard:18x23:50mm"
+
+
+def content(path: Path) -> dict[str, object]:
+    """Everything in a camera file but its provenance."""
+    values: dict[str, object] = {}
+    with h5py.File(path) as file:
+        file.visititems(lambda name, item: values.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
+        values |= {f"Camera@{name}": value for name, value in file["Camera"].attrs.items()}
+    values.pop("Calibration/provenance")
+    return values
+
+
+def assert_equal_files(one: Path, other: Path) -> None:
+    first, second = content(one), content(other)
+    assert first.keys() == second.keys()
+    for name in first:
+        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
 
 def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> None:
     photographs = sorted((data_dir / "sandia_checkerboard").glob("*.png"))
     window.picture("1-start")
     assert not any(map(str.isdigit, window.rms))
-    for step in (
-        "find-corners",
-        "view-corners",
-        "calibrate",
-        "reprojection-error",
-        "visualize-distortion",
-        "save-camera",
-    ):
+    for step in STEPS:
         assert not window.enabled(step), step
     window.describe("sandia", 18, 23, 50)
     assert not window.enabled("find-corners")
@@ -27,9 +42,39 @@ def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> 
     window.until(lambda: window.enabled("find-corners"))
     window.picture("2-selected")
     window.find_corners()
+    assert window.status == "The board is found in 10 of 10 photographs."
     window.picture("3-found")
-    window.calibrate()
-    window.picture("4-calibrated")
+    window.click("view-corners")
+    window.until(lambda: window.element("viewed").text == "001.png (1 of 10)")
+    window.until(lambda: len(window.find_all("svg image")) == 1)
+    window.picture("4-corners")
+    before = window.calibrate()
+    window.until(lambda: window.find_all(".verdict"))
+    window.picture("5-result")
+    window.click("reprojection-error")
+    window.until(lambda: len(window.find_all(".report img.plot")) == 2)
+    window.picture("6-reprojection")
+    window.click("visualize-distortion")
+    window.until(lambda: window.find_all("img[alt='size of the distortion']"))
+    window.picture("7-distortion")
+    window.tab("Poses")
+    window.until(lambda: len(window.find_all(".space g.board")) == 10 + 1)
+    window.picture("8-poses")
+    rows = window.rows("worst-images")
+    assert len(rows) == 5
+    worst = rows[0][0]
+    window.row("worst-images", 0).find_element("css selector", ".q-checkbox").click()
+    window.press("Remove and recalibrate")
+    window.until(lambda: window.status.startswith("Calibrated from 9 views"))
+    window.until(lambda: window.text_is_there("1 dropped"))
+    window.picture("9-without-the-worst")
+    assert float(window.rms.split()[0]) != before
     window.click("save-camera")
-    window.until(lambda: window.status.startswith("Camera saved"))
-    window.picture("5-saved")
+    window.until(lambda: window.status == "Camera saved: sandia.h5")
+    by_cli = tmp_path / "cli.h5"
+    run_cli("calibrate", *photographs, "--board", BOARD, "--name", "sandia", "--exclude", worst, "-o", by_cli)
+    assert_equal_files(window.server.folder / "sandia.h5", by_cli)
+    downloaded = window.browser.downloads / "sandia.h5"
+    window.until(downloaded.exists)
+    window.until(lambda: downloaded.read_bytes() == (window.server.folder / "sandia.h5").read_bytes())
+    shutil.rmtree(window.browser.downloads)

@@ -1,0 +1,53 @@
+"""Sections of the report on the page: made aside, when they are first looked at, once for each result."""
+
+import asyncio
+from collections.abc import Callable, Hashable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+from nicegui import background_tasks, ui
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.page import Page
+
+__all__ = ["drawn", "of_calibration"]
+
+DRAWING = ThreadPoolExecutor(1, thread_name_prefix="drawing")
+"""One at a time, because matplotlib's settings are global."""
+
+
+def drawn(key: Callable[[], Hashable], make: Callable[[], str]) -> Callable[[], None]:
+    """An element with HTML that is made in another thread whenever its key is a new one, and empty where it is None.
+
+    Returns
+    -------
+    callable
+        Brings it up to date.
+    """
+    element = ui.html("", sanitize=False).classes("report")  # ours, and escaped where it is made
+    shown: list[Any] = [None]
+
+    async def draw(wanted: Hashable) -> None:
+        content = await asyncio.get_running_loop().run_in_executor(DRAWING, make)
+        if shown[0] == wanted and not element.is_deleted:
+            element.set_content(content)
+
+    def refresh() -> None:
+        wanted = key()
+        if wanted == shown[0]:
+            return
+        shown[0] = wanted
+        element.set_content("" if wanted is None else '<p class="quiet">Drawing …</p>')
+        if wanted is not None:
+            background_tasks.create(draw(wanted))
+
+    return refresh
+
+
+def of_calibration(page: "Page", make: Callable[..., str]) -> Callable[[], None]:
+    """The same of the session's calibration, which `make` takes."""
+    session = page.session
+    return drawn(
+        lambda: None if session.calibration is None else id(session.calibration),
+        lambda: make(session.calibration) if session.calibration else "",
+    )

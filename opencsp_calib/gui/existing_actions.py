@@ -1,0 +1,166 @@
+"""What can be done with an existing camera: check, compare, convert, undistort."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nicegui import ui
+
+from opencsp_calib.camera_files import CameraFile, convert, read_camera_file, write_camera_file
+from opencsp_calib.comparison import compare
+from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.gui.asking import may_write
+from opencsp_calib.gui.controls import choice, field, quiet_action
+from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.news import Message
+from opencsp_calib.gui.saving import writable_formats
+from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.report.figures import as_image
+from opencsp_calib.report.plots import difference_plot
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.page import Page
+
+__all__ = ["ACTIONS", "Chosen"]
+
+LEVELS = {"ok": "good", "degraded": "doubt", "wrong": "bad"}
+
+
+@dataclass
+class Chosen:
+    """The camera file that is open, and where answers about it go."""
+
+    path: Path | None = None
+    file: CameraFile | None = None
+    answer: ui.html | None = None
+
+    def tell(self, html: str) -> None:
+        """Show an answer."""
+        if self.answer is not None:
+            self.answer.set_content(html)
+
+    @property
+    def opened(self) -> CameraFile:
+        """The file; an InputError where none is open."""
+        if self.file is None:
+            raise InputError("open a camera file first")
+        return self.file
+
+
+Refresh = Callable[[], None]
+
+
+def _check(page: "Page", chosen: Chosen) -> Refresh:
+    session = page.session
+
+    async def work() -> None:
+        found: dict[str, Any] = await session.job(
+            "check",
+            camera=str(chosen.path),
+            images=[str(file.path) for file in session.selection.files],
+            board=session.settings.spec if session.settings.is_complete else "",
+        )
+        level = LEVELS[found["verdict"]]
+        reasons = "".join(f"<li>{escape(reason)}</li>" for reason in found["reasons"])
+        sentence = f"{found['name']}: {found['verdict']}"
+        chosen.tell(f'<div class="verdict {level}">{escape(sentence)}</div><ul class="warnings">{reasons}</ul>')
+        session.message = Message(f"Checked: {sentence}", "good" if level == "good" else "bad")
+
+    ui.html("<h2>Check against photographs</h2>", sanitize=False)
+    ui.label("Takes the photographs and the board under Calibrate.").classes("hint")
+    button = quiet_action("Check", lambda: session.start("Checking", work), "check-camera")
+
+    def refresh() -> None:
+        button.set_enabled(chosen.file is not None and bool(session.selection.files) and not session.busy)
+
+    return refresh
+
+
+def _compare(page: "Page", chosen: Chosen) -> Refresh:
+    session = page.session
+
+    def run() -> None:
+        if other.value.strip():
+            camera = read_camera_file(within(session.folder, other.value)).camera
+        elif session.calibration:
+            camera = session.calibration.camera
+        else:
+            raise InputError("name another camera file, or calibrate first")
+        try:
+            range_m = float(distance.value) if distance.value.strip() else None
+        except ValueError:
+            raise InputError(f"the range is a number of metres, not {distance.value!r}") from None
+        found = compare(chosen.opened.camera, camera, range_m=range_m)
+        where = "at infinity" if range_m is None else f"at {range_m:g} m"
+        sentence = (
+            f"{where}: rms {found.rms_px:.4g} px, median {found.median_px:.4g} px, worst {found.worst_px:.4g} px over "
+            f"the image, after a turn of the frame by {found.rotation_deg:.4g} degrees"
+        )
+        chosen.tell(f"<h2>Compared</h2><p>{escape(sentence)}</p>" + as_image(difference_plot(found), sentence))
+        session.say("Compared.", "good")
+
+    ui.html("<h2>Compare</h2>", sanitize=False)
+    other = field("With another file; empty: with the result here", "", lambda _: None)
+    distance = field("Range in m; empty: at infinity", "", lambda _: None)
+    return _needs_file(quiet_action("Compare", lambda: page.attempt(run), "compare-cameras"), chosen)
+
+
+def _convert(page: "Page", chosen: Chosen) -> Refresh:
+    session = page.session
+
+    async def run() -> None:
+        try:
+            path = within(session.folder, place.value.strip() or "converted")
+            if path.is_dir():
+                raise InputError("name the file to write")
+            accepted = float(accept.value) if accept.value.strip() else None
+            made = convert(chosen.opened, fit.value or None, accepted)
+            if await may_write(path):
+                write_camera_file(made.camera, path, form.value or None, made.record)
+                said = f" ({made.record['import fit']})" if made.fit else ""
+                session.say(f"Camera saved: {shown(session.folder, path)}{said}", "good")
+        except ValueError:
+            session.say("The accepted error is a number of pixels.", "bad")
+        except CalibError as error:
+            session.say(str(error), "bad")
+
+    ui.html("<h2>Convert</h2>", sanitize=False)
+    form = choice(
+        "Format", {"": "by the name's ending", "opencsp": "OpenCSP (HDF5)", **writable_formats()}, "", lambda _: None
+    )
+    fit = choice("Lens model", {"": "exactly as it is", **{m: f"fit {m}" for m in LENS_MODELS}}, "", lambda _: None)
+    accept = field("Accepted error of a fit in px", "", lambda _: None, hint="0.1")
+    place = field("Save as", "", lambda _: None, "convert-to", "camera.yaml")
+    return _needs_file(quiet_action("Convert", run, "convert-camera"), chosen)
+
+
+def _undistort(page: "Page", chosen: Chosen) -> Refresh:
+    session = page.session
+
+    async def work() -> None:
+        folder = within(session.folder, place.value.strip() or "undistorted")
+        images = [str(file.path) for file in session.selection.files]
+        await session.job("undistort", camera=str(chosen.path), images=images, folder=str(folder))
+        session.message = Message(f"{len(images)} images saved in {shown(session.folder, folder)}", "good")
+
+    ui.html("<h2>Undistort photographs</h2>", sanitize=False)
+    ui.label("Takes the photographs under Calibrate, as a pinhole camera would have taken them.").classes("hint")
+    place = field("Into the folder", "", lambda _: None, hint="undistorted")
+    button = quiet_action("Undistort", lambda: session.start("Undistorting", work), "undistort")
+
+    def refresh() -> None:
+        button.set_enabled(chosen.file is not None and bool(session.selection.files) and not session.busy)
+
+    return refresh
+
+
+def _needs_file(button: ui.button, chosen: Chosen) -> Refresh:
+    def refresh() -> None:
+        button.set_enabled(chosen.file is not None)
+
+    return refresh
+
+
+ACTIONS = (_check, _compare, _convert, _undistort)

@@ -1,0 +1,92 @@
+"""A board to print at true size: what it looks like, and as PDF, SVG or PNG."""
+
+import base64
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+from urllib.parse import quote
+
+from nicegui import ui
+
+from opencsp_calib.board import Board
+from opencsp_calib.drawing import Drawing, write_board
+from opencsp_calib.errors import CalibError
+from opencsp_calib.gui.asking import may_write
+from opencsp_calib.gui.controls import action, choice, field
+from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.session import Session
+from opencsp_calib.registry import installed
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.page import Page
+
+__all__ = ["build"]
+
+EXAMPLE = "checkerboard:18x23:50mm"
+KINDS = {".pdf": "PDF", ".svg": "SVG", ".png": "PNG, 300 dots an inch"}
+
+
+def build(page: "Page") -> Callable[[], None]:
+    """See `page.py`."""
+    session = page.session
+    drawn: list[str] = [""]
+
+    async def save() -> None:
+        name = place.value.strip() or "board"
+        try:
+            path = within(session.folder, name if Path(name).suffix else name + suffix.value)
+            await _save(session, installed().board(spec.value.strip()), path)
+        except CalibError as error:
+            session.say(str(error), "bad")
+
+    with ui.element("div").classes("two"):
+        with ui.element("div").classes("narrow"):
+            ui.html("<h2>Print a board</h2>", sanitize=False)
+            started = session.settings.spec if session.settings.is_complete else EXAMPLE
+            spec = field("Description of the board", started, lambda _: refresh(), "board-spec")
+            for kind in installed().boards.values():
+                ui.label(kind.grammar).classes("hint")
+            said = ui.label().classes("hint")
+            suffix = choice("As", KINDS, ".pdf", lambda _: refresh())
+            place = field("Save as", "", lambda _: None, hint="board.pdf")
+            button = action("Save Board", save, "save-board")
+        picture = ui.element("img").classes("board-picture").props('alt="The board as it will be printed"')
+
+    def refresh() -> None:
+        text = spec.value.strip()
+        place.props["placeholder"] = f"board{suffix.value}"
+        if text == drawn[0]:
+            return
+        drawn[0] = text
+        try:
+            source, wrong = _preview(installed().board(text)), ""
+        except CalibError as error:
+            source, wrong = "", str(error)
+        said.set_text(wrong)
+        button.set_enabled(bool(source))
+        picture.set_visibility(bool(source))
+        picture.props["src"] = source
+
+    return refresh
+
+
+async def _save(session: Session, board: Board, path: Path) -> None:
+    if not await may_write(path):
+        return
+    write_board(board, _drawing(board), path)
+    place = shown(session.folder, path)
+    session.say(f"Board saved: {place}. Print it at 100 %, and measure its bar.", "good")
+    ui.download.from_url(f"files?path={quote(place)}")
+
+
+def _drawing(board: Board) -> Drawing:
+    return installed().boards[board.kind].draw(board)
+
+
+def _preview(board: Board) -> str:
+    """The board as a picture in the page."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "board.svg"
+        write_board(board, _drawing(board), path)
+        return "data:image/svg+xml;base64," + base64.b64encode(path.read_bytes()).decode()

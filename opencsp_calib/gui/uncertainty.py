@@ -1,0 +1,17 @@
+"""How far to trust the result: over the image, over range, and what single views do to it."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from opencsp_calib.gui.drawn import of_calibration
+from opencsp_calib.report.trust_section import trust_section
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.page import Page
+
+__all__ = ["build"]
+
+
+def build(page: "Page") -> Callable[[], None]:
+    """See `page.py`."""
+    return of_calibration(page, trust_section)

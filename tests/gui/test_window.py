@@ -1,0 +1,310 @@
+"""The window when things go wrong, or are left and taken up again; who is let in; what else can be done."""
+
+import http.client
+import json
+import socket
+import stat
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from gui_window import Server, Window, run_cli
+from worlds import SmallWorld
+
+from opencsp_calib import Camera
+from opencsp_calib.images import write_image
+
+pytestmark = pytest.mark.timeout(300)
+
+
+@pytest.fixture
+def small(window: Window, photographs: Path) -> Window:
+    """The window with photographs of the small world selected."""
+    window.describe("small", 9, 6, 30)
+    window.select(sorted(photographs.glob("*.png")))
+    window.until(lambda: window.enabled("find-corners"))
+    return window
+
+
+# --- who is let in ----------------------------------------------------------------------------------------------------
+
+
+def answer(server: Server, path: str, method: str = "GET", **headers: str) -> int:
+    """The status of a request without the browser's cookie."""
+    where = urlsplit(server.address)
+    connection = http.client.HTTPConnection(where.hostname or "", where.port or 0, timeout=30)
+    connection.request(method, path, headers=headers)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+def test_only_who_has_the_token_is_let_in(server: Server) -> None:
+    token = urlsplit(server.address).query
+    home, own = f"/?{token}", urlsplit(server.address).netloc
+    socket_path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+    upgrade |= {"Sec-WebSocket-Key": "x3JJHMbDL1EzLkh9GBhXDw=="}
+    assert answer(server, home) == 200
+    assert answer(server, home, Origin=f"http://{own}") == 200
+    for path in ("/", "/?token=wrong", "/?token=", "/photographs?image=x", "/files?path=x", "/nothing", socket_path):
+        assert answer(server, path) == 403, path
+    assert answer(server, socket_path, **upgrade) == 403
+    for host in ("evil.example", f"evil.example:{urlsplit(own).port}", "127.0.0.1.evil.example", "", "[", "10.0.0.1"):
+        assert answer(server, home, Host=host) == 403, host
+    for origin in ("http://evil.example", "null", f"https://evil.example/{own}", "http://127.0.0.1:1"):
+        assert answer(server, home, Origin=origin) == 403, origin
+    where = urlsplit(server.address)
+    assert answer(server, "/photographs?name=a&batch=b&count=1", method="PUT") == 403
+    assert not list(server.folder.rglob("*"))
+    with socket.socket() as elsewhere:  # another address of this machine: nobody listens there
+        elsewhere.settimeout(5)
+        assert elsewhere.connect_ex(("127.0.0.2", where.port or 0)) != 0
+
+
+def test_files_outside_of_the_folder_are_out_of_reach(server: Server, tmp_path: Path) -> None:
+    token = urlsplit(server.address).query
+    (tmp_path / "secret.h5").write_text("secret")
+    (server.folder / "link.h5").symlink_to(tmp_path / "secret.h5")
+    (server.folder / "inside.txt").write_text("inside")
+    assert answer(server, f"/files?path=inside.txt&{token}") == 200
+    outside = (
+        "../secret.h5",
+        str(tmp_path / "secret.h5"),
+        "link.h5",
+        "/etc/passwd",
+        "..%2Fsecret.h5",
+        "a/../../secret.h5",
+    )
+    for path in outside:
+        assert answer(server, f"/files?path={path}&{token}") == 403, path
+    assert answer(server, f"/photographs?image=..%2Fsecret.h5&{token}") == 404
+    assert answer(server, f"/..%2F..%2Fetc%2Fpasswd?{token}") == 404
+
+
+def test_nothing_is_printed_but_one_address(photographs: Path, tmp_path: Path) -> None:
+    with Server(tmp_path) as server:
+        assert answer(server, "/?" + urlsplit(server.address).query) == 200
+    assert server.more_output == ""
+    assert server.errors == ""
+    assert {path.name for path in tmp_path.iterdir()} <= {"opencsp-calib-session"}
+
+
+def test_nothing_is_asked_of_another_machine(small: Window) -> None:
+    small.find_corners()
+    small.tab("Print a board")
+    small.until(lambda: small.find_all(".board-picture[src^=data]"))
+    asked = set()
+    for entry in small.browser.get_log("performance"):
+        message = json.loads(entry["message"])["message"]
+        if message["method"] in ("Network.requestWillBeSent", "Network.webSocketCreated"):
+            asked.add(message["params"].get("url") or message["params"]["request"]["url"])
+    assert {urlsplit(url).scheme for url in asked} <= {"http", "ws", "data", "blob"}
+    assert {urlsplit(url).hostname for url in asked if urlsplit(url).scheme in ("http", "ws")} == {"127.0.0.1"}
+    errors = [entry for entry in small.browser.get_log("browser") if entry["level"] == "SEVERE"]
+    assert not errors
+
+
+# --- when things go wrong ---------------------------------------------------------------------------------------------
+
+
+def test_wrong_images_say_why(window: Window, photographs: Path, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("no image")
+    (tmp_path / "empty.png").write_bytes(b"")
+    write_image(np.full((480, 640), 90, np.uint8), tmp_path / "grey.png")
+    write_image(np.full((200, 300), 90, np.uint8), tmp_path / "small.png")
+    window.describe("small", 9, 6, 30)
+    window.select([*sorted(photographs.glob("*.png"))[:4], *sorted(tmp_path.glob("*.*"))])
+    window.until(lambda: window.enabled("find-corners"))
+    window.find_corners()
+    assert window.status == "The board is found in 4 of 8 photographs."
+    table = {row[1]: row for row in window.rows("images")}
+    assert table["notes.txt"][2] == table["empty.png"][2] == "unreadable"
+    assert "empty" in table["empty.png"][-1]
+    assert table["grey.png"][2] == "no board"
+    assert table["grey.png"][-1]
+    assert table["small.png"][2] in ("wrong size", "no board")
+    assert table["01.png"][2:4] == ["used", "54"]
+    window.picture("wrong-images")
+    window.click("view-corners")
+    window.until(lambda: window.element("viewed").text.startswith("01.png"))
+    body = window.browser.find_element("tag name", "body")
+    for _ in range(4):
+        body.send_keys("\ue014")  # right
+    window.until(lambda: window.element("viewed").text == "empty.png (5 of 8)")
+    body.send_keys("\ue012")  # left
+    window.until(lambda: window.element("viewed").text == "04.png (4 of 8)")
+
+
+def test_no_board_anywhere_and_a_board_that_is_none(window: Window, tmp_path: Path) -> None:
+    for index in range(3):
+        write_image(np.full((240, 320), 60 + index, np.uint8), tmp_path / f"{index}.png")
+    window.describe("camera", 9, 6, 30)
+    window.select(sorted(tmp_path.glob("*.png")))
+    window.until(lambda: window.enabled("find-corners"))
+    window.type("grid-x", "2")
+    window.until(lambda: not window.enabled("find-corners"))
+    window.until(lambda: window.text_is_there("at least 3 inner corners"))
+    window.type("grid-x", "nine")
+    window.until(lambda: window.text_is_there("whole number"))
+    window.type("grid-x", "9")
+    window.find_corners()
+    assert window.status == "The board is found in 0 of 3 photographs."
+    assert not window.enabled("calibrate")
+
+
+def test_cancel_then_go_on(small: Window) -> None:
+    small.click("find-corners")
+    small.click("cancel")
+    small.until(lambda: "stopped" in small.status or small.status.startswith("The board is found"))
+    small.until(lambda: small.enabled("find-corners"))
+    small.find_corners()
+    assert small.status == "The board is found in 12 of 12 photographs."
+
+
+def test_reload_in_the_middle_and_a_second_tab_lose_nothing(small: Window) -> None:
+    browser = small.browser
+    small.click("find-corners")
+    browser.refresh()
+    small.until(lambda: small.status.startswith("The board is found in 12 of 12"))
+    assert small.element("camera-name").get_attribute("value") == "small"
+    first = browser.current_window_handle
+    browser.switch_to.new_window("tab")
+    browser.get(small.server.root)  # by the cookie
+    small.until(lambda: small.enabled("calibrate"))
+    rms = small.calibrate()
+    small.type("camera-name", "renamed")
+    browser.close()
+    browser.switch_to.window(first)
+    small.until(lambda: small.rms == f"{rms:.4f} px")
+    small.until(lambda: small.element("camera-name").get_attribute("value") == "renamed")
+
+
+def test_tomorrow_it_goes_on_from_here(chromium: object, photographs: Path, tmp_path: Path) -> None:
+    with Server(tmp_path) as server:
+        window = Window(chromium, server)
+        window.open()
+        window.describe("small", 9, 6, 30)
+        window.select(sorted(photographs.glob("*.png")))
+        window.until(lambda: window.enabled("find-corners"))
+        window.find_corners()
+        rms = window.calibrate()
+    with Server(tmp_path) as server:
+        window = Window(chromium, server)
+        window.open()
+        assert window.rms == f"{rms:.4f} px"
+        assert [window.element(name).get_attribute("value") for name in ("grid-x", "grid-y")] == ["9", "6"]
+        assert window.enabled("calibrate")
+        assert len(window.rows("images")) == 12
+
+
+def test_a_place_that_cannot_be_written(small: Window) -> None:
+    small.find_corners()
+    small.calibrate()
+    folder = small.server.folder
+    (folder / "taken.h5").mkdir()
+    for place, words in (
+        ("no/such/camera.h5", "does not exist"),
+        ("taken.h5", "is a folder"),
+        ("../out.h5", "outside of"),
+    ):
+        small.type("save-as", place)
+        small.click("save-camera")
+        small.until(lambda words=words: words in small.status)
+    assert not list(folder.glob("*.h5/*"))
+    small.type("save-as", "camera.h5")
+    small.click("save-camera")
+    small.until(lambda: small.status == "Camera saved: camera.h5")
+    written = (folder / "camera.h5").read_bytes()
+    small.click("save-camera")
+    small.until(lambda: small.text_is_there("is there already"))
+    small.picture("overwrite")
+    small.press("Keep it")
+    small.until(lambda: small.enabled("save-camera"))
+    assert (folder / "camera.h5").read_bytes() == written
+    assert stat.S_ISREG((folder / "camera.h5").stat().st_mode)
+
+
+# --- beside calibrating -----------------------------------------------------------------------------------------------
+
+
+def test_put_back_is_as_before(small: Window) -> None:
+    small.find_corners()
+    rms = small.rms if small.calibrate() else ""
+    small.row("worst-images", 1).find_element("css selector", ".q-checkbox").click()
+    small.press("Remove and recalibrate")
+    small.until(lambda: "from 11 views" in small.status)
+    small.until(lambda: small.text_is_there("moved by"))
+    small.tab("Photographs")
+    small.until(lambda: [row for row in small.rows("images") if row[2] == "left out"])
+    out = next(index for index, row in enumerate(small.rows("images")) if row[2] == "left out")
+    small.row("images", out).find_element("css selector", ".q-checkbox").click()
+    small.press("Put back")
+    small.until(lambda: "from 12 views" in small.status)
+    assert small.rms == rms
+
+
+def test_an_existing_camera(small: Window, small_world: SmallWorld) -> None:
+    small_world.camera.save(small.server.folder / "truth.h5")
+    small.tab("Existing camera")
+    small.type("camera-file", "../truth.h5")
+    small.click("open-camera")
+    small.until(lambda: "outside of" in small.status)
+    small.type("camera-file", "truth.h5")
+    small.click("open-camera")
+    small.until(lambda: small.text_is_there("800.000 px"))
+    small.click("check-camera")
+    small.until(lambda: small.status == "Checked: small: ok")
+    small.picture("existing-camera")
+    small.type("convert-to", "camera.json")
+    small.click("convert-camera")
+    small.until(lambda: "--to" in small.status or "saved" in small.status)
+    small.type("convert-to", "again.h5")
+    small.click("convert-camera")
+    small.until(lambda: small.status == "Camera saved: again.h5")
+    assert Camera.load(small.server.folder / "again.h5") == small_world.camera
+    small.click("undistort")
+    small.until(lambda: "12 images saved in undistorted" in small.status)
+    assert len(list((small.server.folder / "undistorted").glob("*.png"))) == 12
+
+
+def test_cross_validation_and_the_report(small: Window) -> None:
+    small.find_corners()
+    small.calibrate()
+    small.tab("Cross-validation")
+    small.press("Cross-validate")
+    small.until(lambda: small.status.startswith("The solvers"))
+    small.until(lambda: small.text_is_there("Solver against solver"))
+    small.picture("cross-validation")
+    small.choose("What", "Report (HTML)")
+    small.type("save-as", "report")
+    small.click("save-camera")
+    small.until(lambda: small.status == "Report saved: report.html")
+    assert "Provenance" in (small.server.folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_print_a_board(window: Window, tmp_path: Path) -> None:
+    window.tab("Print a board")
+    window.type("board-spec", "checkerboard:5x4:30mm")
+    window.click("save-board")
+    window.until(lambda: window.status.startswith("Board saved: board.pdf"))
+    run_cli("board", "checkerboard:5x4:30mm", "-o", tmp_path / "cli.pdf")
+    assert (window.server.folder / "board.pdf").read_bytes() == (tmp_path / "cli.pdf").read_bytes()
+
+
+def test_a_camera_is_no_file_name(window: Window, photographs: Path) -> None:
+    """A name with a path in it stays within the folder; photographs in the folder need no upload."""
+    folder = window.server.folder
+    (folder / "set").mkdir()
+    for photograph in sorted(photographs.glob("*.png"))[:5]:
+        (folder / "set" / photograph.name).write_bytes(photograph.read_bytes())
+    window.describe("../evil", 9, 6, 30)
+    window.type("photograph-folder", "set")
+    window.press("Use")
+    window.until(lambda: window.status == "5 photographs in set.")
+    window.find_corners()
+    window.calibrate()
+    window.click("save-camera")
+    window.until(lambda: window.status == "Camera saved: evil.h5")
+    assert not list(folder.parent.glob("*.h5"))
