@@ -23,7 +23,7 @@ from opencsp_calib.projection_sigma import camera_sigma_map, sigma_map
 from opencsp_calib.resampling import Solve
 from opencsp_calib.uncertainty import with_uncertainty
 
-__all__ = ["Check", "Judged", "Verdict", "check"]
+__all__ = ["Check", "Judged", "Verdict", "check", "judged", "worse"]
 
 Verdict = Literal["ok", "degraded", "wrong"]
 
@@ -91,7 +91,7 @@ class Check:
     @property
     def decisive(self) -> Judged:
         """The comparison with the worse verdict; of two alike, the one that is more sigmas off."""
-        return max((self.at_range, self.at_infinity), key=lambda one: (SEVERITY.index(one.verdict), one.sigmas))
+        return worse(self.at_range, self.at_infinity)
 
     @property
     def verdict(self) -> Verdict:
@@ -165,11 +165,22 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
     if not np.isfinite(fresh.covariance).all():
         said = fresh.problems[-1].message if fresh.problems else "its uncertainty is not known"
         raise CalibrationFailedError(f"no fresh solution to check against: {said}")
+    at_range, at_infinity = judged(camera, fresh, covariance)
+    return Check(camera, fresh, at_range, at_infinity, _view_rms(camera, fresh))
+
+
+def judged(camera: Camera, fresh: Calibration, covariance: Matrix | None = None) -> tuple[Judged, Judged]:
+    """A camera compared with a fresh calibration: at the range where the boards were, and at infinity."""
     at_range, at_infinity = (
         Judged(compare(fresh.camera, camera, range_m=r), _predicted(camera, fresh, covariance, r))
         for r in (_working_range(fresh), None)
     )
-    return Check(camera, fresh, at_range, at_infinity, _view_rms(camera, fresh))
+    return at_range, at_infinity
+
+
+def worse(*found: Judged) -> Judged:
+    """The one with the worse verdict; of two alike, the one that is more sigmas off."""
+    return max(found, key=lambda one: (SEVERITY.index(one.verdict), one.sigmas))
 
 
 def _predicted(camera: Camera, fresh: Calibration, covariance: Matrix | None, range_m: float | None) -> float:

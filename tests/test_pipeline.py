@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import threading
+import weakref
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,9 +12,22 @@ import pytest
 from worlds import SmallWorld
 
 import opencsp_calib
-from opencsp_calib import Calibration, Checkerboard, InputError, Observations, calibrate, detect, solve
+from opencsp_calib import (
+    Calibration,
+    Checkerboard,
+    Detection,
+    Image,
+    InputError,
+    Observations,
+    calibrate,
+    detect,
+    solve,
+)
+from opencsp_calib.detecting import look_at
 from opencsp_calib.dropping import drop_above, drop_worst, excluding
 from opencsp_calib.errors import CancelledError
+from opencsp_calib.images import find_images
+from opencsp_calib.looking import Search
 from opencsp_calib.synthetic import observe
 
 SCRIPT = """
@@ -145,3 +159,34 @@ def test_no_board_says_the_commonest_reason(tmp_path: Path, small_world: SmallWo
     )
     with pytest.raises(InputError, match="any of the 12 images: too dark"):
         solve(Observations(Checkerboard(9, 6, 0.03), (640, 480), nothing))
+
+
+class Counting:
+    """A detector that finds nothing, and counts the images that are in memory while it looks."""
+
+    name, feature = "counting", "own"
+
+    def __init__(self) -> None:
+        self.alive: weakref.WeakSet[Image] = weakref.WeakSet()
+        self.most, self.looked = 0, 0
+
+    def missing(self) -> None:
+        return None
+
+    def supports(self, board: opencsp_calib.Board) -> bool:
+        return True
+
+    def detect(self, image: Image, board: opencsp_calib.Board) -> Detection:
+        self.alive.add(image)
+        self.most = max(self.most, len(self.alive))
+        self.looked += 1
+        return Detection.nothing("not looked for")
+
+
+def test_no_more_images_are_in_memory_than_are_looked_at(photographs: Path) -> None:
+    detector = Counting()
+    file = find_images(photographs)[0]
+    files = [replace(file, name=f"{index}.png") for index in range(60)]
+    found = look_at(files, Search(Checkerboard(9, 6, 0.03), detector, "none"), jobs=2)
+    assert detector.looked == len(found.views) == 60
+    assert detector.most <= 3  # one each, and one that is being handed over

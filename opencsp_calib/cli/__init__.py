@@ -10,7 +10,7 @@ import warnings
 
 import typer
 
-from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, setting_up, window
+from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, fleets, setting_up, window
 from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.setting_up import print_versions
 from opencsp_calib.cli.stopping import stop_when_told
@@ -28,7 +28,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for module in (calibrating, cameras, capturing, converting, checking, setting_up, window):
+for module in (calibrating, cameras, capturing, converting, checking, fleets, setting_up, window):
     for command in module.COMMANDS:
         app.command()(command)
 
