@@ -14,6 +14,7 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import InputError
+from opencsp_calib.free_board import turn_between
 from opencsp_calib.normal_equations import solvable_corners
 
 __all__ = ["FLATNESS_LIMIT_M", "Flatness", "aligned", "flatness", "flatness_of_solved", "not_flat"]
@@ -110,14 +111,8 @@ def not_flat(calibration: Calibration) -> tuple[Problem, ...]:
 
 
 def aligned(points: Points, target: Points) -> Points:
-    """Points moved by the similarity that brings them closest to others, (n, 3) each.
-
-    Source: S. Umeyama, "Least-squares estimation of transformation parameters between two point patterns", PAMI 1991.
-    """
+    """Points moved by the similarity that brings them closest to others, (n, 3) each."""
     middle, target_middle = points.mean(axis=0), target.mean(axis=0)
     centred, target_centred = points - middle, target - target_middle
-    u, sizes, vt = np.linalg.svd(target_centred.T @ centred)
-    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
-    rotation = u @ (signs[:, None] * vt)
-    scale = (sizes @ signs) / (centred**2).sum()
-    return np.asarray(scale * centred @ rotation.T + target_middle, dtype=np.float64)
+    turn, product = turn_between(centred, target_centred)
+    return np.asarray(product / (centred**2).sum() * centred @ turn.T + target_middle, dtype=np.float64)

@@ -1,92 +1,84 @@
 """A board whose shape was solved for: laid on the board as given, and the corners that its solution leaves open."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats, Ids, Mask, Params, Points
-from opencsp_calib.board import Board
-from opencsp_calib.detection import Detection
+from opencsp_calib.arrays import Ids, Matrix, Points
+from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
-from opencsp_calib.rotations import rotation_matrices, rotation_vectors
+from opencsp_calib.unknowns import Estimate
 
-__all__ = ["laid_on_given", "times_seen", "with_lone_corners"]
-
-
-def times_seen(board: Board, detections: Sequence[Detection]) -> Ids:
-    """(K,) in how many views each corner is: from one alone, its distance cannot be told."""
-    ids = np.concatenate([detection.ids for detection in detections])
-    return np.asarray(np.bincount(ids, minlength=len(board.points)))
+__all__ = ["laid_on_given", "turn_between", "with_lone_corners"]
 
 
-def laid_on_given(
-    board: Board, points: Points, rotations: Floats, translations: Floats, solved: Mask
-) -> tuple[Points, Floats, Floats]:
-    """A board as solved, turned, shifted and scaled to the board as given, with poses that show the same.
+def turn_between(points: Points, target: Points) -> tuple[Matrix, float]:
+    """The turn about the origin that brings points nearest to others, and the sum of their products after it.
 
-    Images tell a board's shape up to a similarity: it is chosen so that the corners solved for lie nearest to the
-    given ones, in the sense of least squares (Umeyama 1991). These seven conditions and no more: others bias the rest.
+    Never a mirror image, however flat the points: their third direction is weak. Source: S. Umeyama, "Least-squares
+    estimation of transformation parameters between two point patterns", PAMI 1991.
 
     Parameters
     ----------
-    board : Board
-        As given.
-    points : (K, 3)
-        As solved, in any frame and unit of length.
-    rotations : (V, 3) rad
-        Rotation vectors, of that frame to the camera.
-    translations : (V, 3)
-        In that unit.
-    solved : (K,) bool
-        Which points count.
+    points, target : (n, 3)
 
     Returns
     -------
-    points : (K, 3) m
-    rotations : (V, 3) rad
-    translations : (V, 3) m
+    turn : (3, 3)
+    product : float
+        Of each turned point with its target, summed.
     """
-    wanted, found = board.points[solved].mean(axis=0), points[solved].mean(axis=0)
-    left, sizes, right = np.linalg.svd((board.points[solved] - wanted).T @ (points[solved] - found))
-    # never a mirror image, however flat the board: its third direction is weak
-    sign = np.array([1.0, 1.0, np.linalg.det(left @ right)])
-    turn = (left * sign) @ right
-    scale = float((sizes * sign).sum() / ((points[solved] - found) ** 2).sum())
-    laid = scale * (points - found) @ turn.T + wanted
-    before = rotation_matrices(rotations)
-    after = before @ turn.T
-    return laid, rotation_vectors(after), scale * (translations + before @ found) - after @ wanted
+    left, sizes, right = np.linalg.svd(target.T @ points)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    return np.asarray(left * signs @ right), float(sizes @ signs)
 
 
-def with_lone_corners(
-    lens: LensModel,
-    params: Params,
-    detections: Sequence[Detection],
-    points: Points,
-    rotations: Floats,
-    translations: Floats,
-    lone: Mask,
-) -> Points:
-    """The same board with the corners that one view alone has seen where that view has seen them.
+def laid_on_given(given: Points, estimate: Estimate, corners: Ids) -> Estimate:
+    """The same estimate in the frame and scale in which its board is nearest to the board as given.
+
+    Images tell a board's shape only up to a shift, a turn and a scale. Those seven are chosen so that the differences
+    d of the corners solved for from the given ones p, about their middle, have none: ``sum d``, ``sum p x d`` and
+    ``sum p . d`` are zero. These conditions and no more: others bias the rest. No projection changes.
+
+    Parameters
+    ----------
+    given : (K, 3) m
+    estimate : Estimate
+        In any frame and unit of length.
+    corners : (C,) int
+        Ids of the corners solved for; the others are put where they are given.
+    """
+    solved, target = estimate.points[corners], given[corners]
+    middle, wanted = solved.mean(axis=0), target.mean(axis=0)
+    turn, product = turn_between(solved - middle, target - wanted)
+    scale = ((target - wanted) ** 2).sum() / product
+    points = given.copy()
+    points[corners] = scale * (solved - middle) @ turn.T + wanted
+    rotations = estimate.rotations @ turn.T
+    translations = scale * (estimate.translations + estimate.rotations @ middle) - rotations @ wanted
+    return replace(estimate, rotations=rotations, translations=translations, points=points)
+
+
+def with_lone_corners(lens: LensModel, table: CornerTable, estimate: Estimate) -> Estimate:
+    """The same estimate with the corners that one view alone has seen where that view has seen them.
 
     One view leaves their distance open: of all points that it sees in the corner's pixel, the nearest to where the
     corner is given. They agree with their pixel whatever the camera, and so tell nothing about it.
 
     Parameters
     ----------
-    lens, params
-        Of the camera as solved.
-    detections : one per used view
-    points : (K, 3) m
-        As solved; lone ones as given.
-    rotations : (V, 3) rad
-    translations : (V, 3) m
-    lone : (K,) bool
+    lens : LensModel
+    table : CornerTable
+        Of all corners.
+    estimate : Estimate
+        Whose board has those corners where they are given.
     """
-    placed: Points = points.copy()
-    for detection, rotation, translation in zip(detections, rotations, translations, strict=True):
-        here = lone[detection.ids]
-        ids, turn = detection.ids[here], rotation_matrices(rotation)
-        rays, camera = lens.unproject(detection.pixels[here], params) @ turn, -translation @ turn
-        placed[ids] = camera + rays * ((points[ids] - camera) * rays).sum(axis=1, keepdims=True)
-    return placed
+    lone = np.bincount(table.ids, minlength=len(estimate.points))[table.ids] == 1
+    view, ids = table.view[lone], table.ids[lone]
+    rotations = estimate.rotations[view]
+    rays = (lens.unproject(table.pixels[lone], estimate.params)[:, None, :] @ rotations)[:, 0]
+    cameras = -(estimate.translations[view][:, None, :] @ rotations)[:, 0]
+    points = estimate.points.copy()
+    seen = cameras + rays * ((points[ids] - cameras) * rays).sum(axis=1, keepdims=True)
+    points[ids] = np.where(np.isfinite(seen), seen, points[ids])  # not where the camera has no ray for the pixel
+    return replace(estimate, points=points)

@@ -1,7 +1,8 @@
 """Whether a calibration can be believed: solver against solver, half against half, model against model.
 
 All on the same observations, without the corners that the calibration left out as outliers. Solvers are compared like
-with like: the board as solved held fixed, equal weights, nothing robust, so that there is one right answer.
+with like: the board as solved held fixed, equal weights, nothing robust, numbers in single precision, which is what
+some engines take, so that there is one right answer.
 """
 
 import time
@@ -163,7 +164,7 @@ def validate(calibration: Calibration, solvers: Mapping[str, Solver], *, models:
 
 def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tuple[tuple[SolverResult, ...], list[str]]:
     """By every solver that can, the board as solved held fixed; and why the others could not."""
-    observations = _of_known_corners(calibration).observations
+    observations = _in_single_precision(_of_known_corners(calibration).observations)
     results, left_out = [], []
     for name, solver in sorted(solvers.items()):
         begin = time.perf_counter()
@@ -176,6 +177,20 @@ def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tupl
         except Exception as error:  # a stranger's code: whatever it does must not stop ours
             left_out.append(f"the solver {name} was left out: {error}")
     return tuple(results), left_out
+
+
+def _in_single_precision(observations: Observations) -> Observations:
+    """Pixels, and the board in units of its spacing, rounded: some engines take no more, and would round by themselves.
+
+    What rounding does, up to 1e-4 px each, can move the corners of the image by a thousandth of a pixel.
+    """
+    views = tuple(
+        replace(view, detection=replace(view.detection, pixels=view.detection.pixels.astype(np.float32)))
+        for view in observations.views
+    )
+    spacing = observations.board.spacing_m
+    points = (observations.board.points / spacing).astype(np.float32).astype(np.float64) * spacing
+    return replace(observations, views=views, board=observations.board.with_points(points))
 
 
 def _tried(

@@ -8,12 +8,14 @@ from solver_worlds import SEED_BOARD, seed_world
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.convergence import judged, remaining_sigmas
+from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
-from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
+from opencsp_calib.free_board import laid_on_given, with_lone_corners
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.solving import check_request, finished
+from opencsp_calib.unknowns import Estimate
 
 
 class Engine:
@@ -34,6 +36,7 @@ class Engine:
 CAMERA, POSES, OBSERVATIONS = seed_world(4)
 ROTATIONS = np.array([pose.rotation for pose in POSES])
 TRANSLATIONS = np.array([pose.translation for pose in POSES])
+ESTIMATE = Estimate(CAMERA.params, np.array([pose.matrix for pose in POSES]), TRANSLATIONS, SEED_BOARD.points)
 
 
 def with_ids(ids):
@@ -148,38 +151,40 @@ def test_a_board_is_laid_on_the_given_one_and_shows_the_same():
     elsewhere = Pose(rng.normal(size=3), rng.normal(size=3))
     points = 7.0 * elsewhere.transform(shape)
     poses = [pose.after(elsewhere.inverse()) for pose in POSES]
-    rotations = np.array([pose.rotation for pose in poses])
+    rotations = np.array([pose.matrix for pose in poses])
     translations = 7.0 * np.array([pose.translation for pose in poses])
-    everything = np.ones(len(points), dtype=bool)
-    laid, turned, moved = laid_on_given(SEED_BOARD, points, rotations, translations, everything)
-    for pose, rotation, translation in zip(POSES, turned, moved, strict=True):
-        seen = CAMERA.project(Pose(rotation, translation).transform(laid))
+    estimate = Estimate(CAMERA.params, rotations, translations, points)
+    laid = laid_on_given(SEED_BOARD.points, estimate, np.arange(418))
+    for pose, found in zip(POSES, laid.poses, strict=True):
+        seen = CAMERA.project(found.transform(laid.points))
         np.testing.assert_allclose(seen, CAMERA.project(pose.transform(shape)), rtol=0, atol=1e-8)
-
-    def distance(step):
-        pose = Pose(step[:3], step[3:6])
-        return ((np.exp(step[6]) * pose.transform(laid) - SEED_BOARD.points) ** 2).sum()
-
-    steps = np.vstack([np.eye(7), -np.eye(7)]) * 1e-6  # no small similarity brings it nearer
-    assert all(distance(step) > distance(np.zeros(7)) for step in steps)
+    given = SEED_BOARD.points - SEED_BOARD.points.mean(axis=0)
+    left = laid.points - SEED_BOARD.points
+    np.testing.assert_allclose(left.sum(axis=0), 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.cross(given, left).sum(axis=0), 0.0, atol=1e-12)
+    assert (given * left).sum() == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_board_is_never_mirrored():
     mirrored = SEED_BOARD.points * [1.0, 1.0, -1.0]
     mirrored[:, 2] += 1e-3 * np.random.default_rng(0).normal(size=len(mirrored))
-    laid, _, _ = laid_on_given(SEED_BOARD, mirrored, ROTATIONS, TRANSLATIONS, np.ones(418, dtype=bool))
+    laid = laid_on_given(SEED_BOARD.points, replace(ESTIMATE, points=mirrored), np.arange(418)).points
     before, after = (np.linalg.det(p[[1, 22, 200]] - p[0]) for p in (mirrored, laid))
     assert np.sign(before) == np.sign(after)
 
 
+def test_corners_that_were_not_solved_for_are_where_they_were_given():
+    moved = replace(ESTIMATE, points=SEED_BOARD.points + np.array([0.0, 0.0, 1e-3]))
+    laid = laid_on_given(SEED_BOARD.points, moved, np.arange(1, 418)).points
+    np.testing.assert_array_equal(laid[0], SEED_BOARD.points[0])
+    np.testing.assert_allclose(laid[1:], SEED_BOARD.points[1:], atol=1e-12)
+
+
 def test_a_lone_corner_lies_where_its_view_sees_it():
     detections = [OBSERVATIONS.detections[0], OBSERVATIONS.detections[1].keeping(np.arange(418) != 9)]
-    times = times_seen(SEED_BOARD, detections)
-    assert (times[9], times[10]) == (1, 2)
     given = SEED_BOARD.points + np.array([0.0, 0.0, 2e-3])
-    placed = with_lone_corners(
-        CAMERA.lens, CAMERA.params, detections, given, ROTATIONS[:2], TRANSLATIONS[:2], times == 1
-    )
+    estimate = replace(ESTIMATE, rotations=ESTIMATE.rotations[:2], translations=ESTIMATE.translations[:2], points=given)
+    placed = with_lone_corners(CAMERA.lens, CornerTable.of(detections), estimate).points
     np.testing.assert_array_equal(np.delete(placed, 9, axis=0), np.delete(given, 9, axis=0))
     pixel = CAMERA.project(POSES[0].transform(placed[9:10]))
     np.testing.assert_allclose(pixel, detections[0].pixels[9:10], atol=1e-8)

@@ -8,11 +8,11 @@ from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observati
 from opencsp_calib.arrays import Mask
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.corner_table import CornerTable
+from opencsp_calib.free_board import laid_on_given, with_lone_corners
 from opencsp_calib.models import LENS_MODELS, LensModel
 from opencsp_calib.normal_equations import residuals, solvable_corners
 from opencsp_calib.solving import MIN_CORNERS, check_request, finished
 from opencsp_calib.unknowns import Estimate, Unknowns
-from opencsp_calib_bundle.board_shape import laid_on, with_lone_corners
 from opencsp_calib_bundle.levenberg_marquardt import Minimum, minimise
 from opencsp_calib_bundle.robust import outlying, weights
 from opencsp_calib_bundle.start import start, with_deeper_minima
@@ -65,7 +65,7 @@ class BundleSolver:
         covariance = checked_covariance(observations, lens, options, minimum, table.typical_weight)
         estimate = minimum.estimate
         if options.board_shape == "free":
-            estimate = laid_on(given, estimate, minimum.equations.unknowns.corners)
+            estimate = laid_on_given(given, estimate, minimum.equations.unknowns.corners)
             estimate = with_lone_corners(lens, table.keeping(~outliers), estimate)
         calibration = finished(
             self,

@@ -11,10 +11,12 @@ import numpy as np
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, Points
 from opencsp_calib.convergence import judged
-from opencsp_calib.free_board import laid_on_given, times_seen, with_lone_corners
+from opencsp_calib.corner_table import CornerTable
+from opencsp_calib.free_board import laid_on_given, with_lone_corners
 from opencsp_calib.initial import initial_camera, initial_poses
 from opencsp_calib.rotations import rotation_vectors
 from opencsp_calib.solving import check_request, finished
+from opencsp_calib.unknowns import Estimate
 from opencsp_calib_colmap.cameras import HALF_PIXEL, MODELS, colmap_params, our_params
 
 __all__ = ["ColmapSolver"]
@@ -53,7 +55,8 @@ class ColmapSolver:
         camera = initial_camera(observations, model, options.guess)
         poses = initial_poses(camera, observations)
         unit = float(np.ptp(observations.board.nominal_points, axis=0).max())
-        times = times_seen(observations.board, observations.detections)
+        table = CornerTable.of(observations.detections)
+        times = np.bincount(table.ids, minlength=len(observations.board.points))
         free = options.board_shape == "free"
         # of a free point that one view alone sees COLMAP wants to know nothing
         scene = _scene(pycolmap, observations, camera, poses, unit, times > (1 if free else 0))
@@ -62,14 +65,15 @@ class ColmapSolver:
         rotations, translations = _poses(scene, len(poses))
         board = observations.board
         if free:
-            points = _points(scene, len(board.points))
-            points, rotations, translations = laid_on_given(board, points, rotations, translations, times > 1)
-            points[times < 2] = board.points[times < 2]
-            placed = points, rotations, translations, times == 1
-            board = board.with_points(with_lone_corners(camera.lens, params, observations.detections, *placed))
+            estimate = Estimate(params, rotations, translations, _points(scene, len(board.points)))
+            estimate = laid_on_given(board.points, estimate, np.flatnonzero(times > 1))
+            estimate = with_lone_corners(camera.lens, table, estimate)
+            board, rotations = board.with_points(estimate.points), estimate.rotations
+            translations = estimate.translations
         else:
             translations = translations * unit
-        calibration = finished(self, observations, model, options, params, rotations, translations, board=board)
+        vectors = rotation_vectors(rotations)
+        calibration = finished(self, observations, model, options, params, vectors, translations, board=board)
         _check_in_front(calibration)
         return judged(calibration)
 
@@ -149,9 +153,9 @@ def _quiet(pycolmap: ModuleType) -> Iterator[None]:
 
 
 def _poses(scene: Any, views: int) -> tuple[Floats, Floats]:
-    """(V, 3) rotation vectors and (V, 3) translations, in the order of the views."""
+    """(V, 3, 3) rotations and (V, 3) translations, in the order of the views."""
     matrices = np.array([scene.images[number].cam_from_world().matrix() for number in range(1, views + 1)])
-    return rotation_vectors(matrices[:, :, :3]), matrices[:, :, 3]
+    return matrices[:, :, :3], matrices[:, :, 3]
 
 
 def _points(scene: Any, count: int) -> Points:

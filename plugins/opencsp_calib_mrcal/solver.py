@@ -13,7 +13,9 @@ from opencsp_calib.convergence import judged
 from opencsp_calib.free_board import laid_on_given
 from opencsp_calib.initial import initial_camera, initial_poses
 from opencsp_calib.models import lens_model
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 from opencsp_calib.solving import check_request, finished
+from opencsp_calib.unknowns import Estimate
 from opencsp_calib_mrcal.process import missing_mrcal, mrcal_version, run_mrcal
 
 __all__ = ["MrcalSolver"]
@@ -93,16 +95,18 @@ class MrcalSolver:
         board, views = observations.board, len(observations.used)
         columns, rows = board.grid
         poses = _answer(solution, "poses", (views, 6))
+        params = _answer(solution, "intrinsics", (len(lens_model(model).parameter_names),))
         rotations, translations = poses[:, :3], poses[:, 3:] * unit
         if options.board_shape == "warp":
-            points, every = _answer(solution, "board", (rows * columns, 3)) * unit, np.ones(rows * columns, dtype=bool)
-            points, rotations, translations = laid_on_given(board, points, rotations, translations, every)
-            board = board.with_points(points)
+            points = _answer(solution, "board", (rows * columns, 3)) * unit
+            estimate = Estimate(params, rotation_matrices(rotations), translations, points)
+            estimate = laid_on_given(board.points, estimate, np.arange(len(points)))
+            board, translations = board.with_points(estimate.points), estimate.translations
+            rotations = rotation_vectors(estimate.rotations)
         outliers: list[Mask] | None = None
         if options.robust:
             weights = _answer(solution, "weights", (views, rows, columns)).reshape(views, -1)
             outliers = [w[d.ids] < 0 for w, d in zip(weights, observations.detections, strict=True)]
-        params = _answer(solution, "intrinsics", (len(lens_model(model).parameter_names),))
         return judged(
             finished(
                 self, observations, model, options, params, rotations, translations, board=board, outliers=outliers
