@@ -16,6 +16,7 @@ import numpy as np
 from opencsp_calib.arrays import Mask
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.comparison import Difference, compare
+from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.interfaces import Solver
 from opencsp_calib.options import SolveOptions
