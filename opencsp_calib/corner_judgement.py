@@ -16,6 +16,8 @@ MOST_MOVED_PX = 3.0
 MOST_QUARTER_MISFIT = 0.2  # of the amplitude; a quarter that is half covered has 1
 MOST_UNEVEN_SATURATION = 0.2  # of opposite quarters
 MOST_MISFIT = 0.1  # of the amplitude; real photographs have up to 0.07
+USUAL_MISFIT = 2.0  # times what is usual in the image: moire is everywhere, and what it costs is stated; but not
+MOST_USUAL_MISFIT = 0.3  # more than this
 MOST_BLUR = 0.5  # of a square's side
 MOST_DEVIATION_PX = 0.3
 GLARING = 0.8  # of white, for what should be black
@@ -62,7 +64,7 @@ def rejections(
         ("too blurred", fit.blur_px > MOST_BLUR * around.lengths.min(axis=1)),
         ("glare", (brighter > MOST_QUARTER_MISFIT) | (_uneven(fit.quarter_saturation) > MOST_UNEVEN_SATURATION)),
         ("occluded", darker < -MOST_QUARTER_MISFIT),
-        ("disturbed by something beside it", fit.misfit > MOST_MISFIT),
+        ("disturbed by something beside it", fit.misfit > _most_misfit(fit)),
         ("too little contrast", ~(deviation < MOST_DEVIATION_PX)),
     ]
     plausible = ~np.any([wrong for _, wrong in verdicts], axis=0)
@@ -80,6 +82,12 @@ def summary(rejected: tuple[RejectedCorner, ...], of: int) -> str:
         return ""
     counts = Counter(corner.reason for corner in rejected).most_common()
     return f"{len(rejected)} of {of} corners rejected: " + ", ".join(f"{reason} ({n})" for reason, n in counts)
+
+
+def _most_misfit(fit: CornerFit) -> float:
+    """What all corners have is not beside one of them."""
+    usual = float(np.median(fit.misfit[fit.converged])) if fit.converged.any() else 0.0
+    return float(np.clip(USUAL_MISFIT * usual, MOST_MISFIT, MOST_USUAL_MISFIT))
 
 
 def _displaced(fit: CornerFit, detection: Detection, columns: int, plausible: Mask) -> Mask:
