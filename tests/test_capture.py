@@ -67,8 +67,8 @@ class Frames:
             self.add(name, Pose(turn, (1 - part) * start.translation + part * end.translation))
 
 
-def released(frames: Frames, path: Path, release=COACH) -> list[str]:
-    """Names of the frames that became photographs, the coach being given the time to learn after each."""
+def released(frames: Frames, path: Path, release=COACH, *, waiting: bool = True) -> list[str]:
+    """Names of the frames that became photographs, the coach being given the time to learn after each, or not."""
     search = Search(frames.world.board, installed().detector("checkerboard"), "model")
     capture = Capture(folder_of(path), search, release, 50)
     taken: list[str] = []
@@ -76,7 +76,7 @@ def released(frames: Frames, path: Path, release=COACH) -> list[str]:
     def show(state) -> None:
         if state.new:
             taken.append(state.moment.glance.image.name.split(" ", 1)[1])
-            while capture.behind:
+            while waiting and capture.behind:
                 time.sleep(0.01)
 
     capture.run(iter(frames.images), show)
@@ -103,7 +103,9 @@ def test_it_releases_at_the_right_moments_and_only_there(world, tmp_path):
     cut = Pose(tilted.rotation, tilted.translation + np.array([0.5 * tilted.translation[2], 0.0, 0.0]))
     frames.move("leaving", tilted, cut, 4)
     frames.add("partly out of view", cut, 4)
-    assert released(frames, tmp_path) == ["first right moment", "second right moment"]
+    right = ["first right moment", "second right moment"]
+    assert released(frames, tmp_path / "waiting") == right
+    assert released(frames, tmp_path / "at once", waiting=False) == right
 
 
 def test_an_interval_releases_whatever_the_coach_thinks(world, tmp_path):

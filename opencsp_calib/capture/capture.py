@@ -14,6 +14,7 @@ from opencsp_calib.detection import Detection
 from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 from opencsp_calib.looking import Search
+from opencsp_calib.pose import Pose
 
 __all__ = ["Capture", "State"]
 
@@ -77,6 +78,7 @@ class Capture:
         self._preview = Preview(search.board, search.detector)
         self._learner: Learner | None = None
         self._places: list[Detection] = []  # of the board in the photographs of this run
+        self._glimpsed: list[Pose] = []  # of the board in photographs that the coach has not learnt from yet
         self._last_s = float("-inf")
         self._sources = folder.sources
         self._pressed, self._stopped, self._deleting = threading.Event(), threading.Event(), threading.Event()
@@ -135,28 +137,41 @@ class Capture:
 
     def _step(self, image: Image) -> State:
         learner = self._learner = self._learner or self._begun(image)
-        if image.size != learner.knowledge.camera.image_size:
-            sizes = " but those before were ".join("x".join(map(str, s)) for s in (image.size, self._image_size))
+        expected = learner.knowledge.camera.image_size
+        if image.size != expected:
+            sizes = " but those before were ".join("x".join(map(str, size)) for size in (image.size, expected))
             raise InputError(f"the images are {sizes}: the camera's region or binning has changed; use another folder")
         if self._deleting.is_set():
             self._deleting.clear()
             self._delete_last(learner)
-        behind = learner.behind
-        moment = judge_moment(self._preview.look(image), learner.knowledge, self._places)
-        pressed = self._pressed.is_set()
-        now = self._clock()
-        due = self.release.due(right=moment.right and not behind, pressed=pressed, since_s=now - self._last_s)
-        new = ""
-        if due and image.sha256 not in self._sources:
-            self._pressed.clear()
-            self._last_s = now
-            new = self.folder.add(image).name
-            self._places.append(moment.glance.detection)
-            learner.know(self.folder.images)
+        moment = judge_moment(self._preview.look(image), self._known(learner), self._places)
+        new = self._photographed(image, moment, learner) if self._is_due(image, moment) else ""
         return State(moment, learner.knowledge, len(self.folder.images), self.count, new)
 
+    def _known(self, learner: Learner) -> Knowledge:
+        """With the photographs that it has not learnt from yet counted by where the board seemed to be."""
+        if not learner.behind:
+            self._glimpsed.clear()
+        known = learner.knowledge
+        for pose in self._glimpsed:
+            known = known.having_seen(pose)
+        return known
+
+    def _is_due(self, image: Image, moment: Moment) -> bool:
+        since_s = self._clock() - self._last_s
+        due = self.release.due(right=moment.right, pressed=self._pressed.is_set(), since_s=since_s)
+        return due and image.sha256 not in self._sources
+
+    def _photographed(self, image: Image, moment: Moment, learner: Learner) -> str:
+        self._pressed.clear()
+        self._last_s = self._clock()
+        name = self.folder.add(image).name
+        self._places.append(moment.glance.detection)
+        self._glimpsed += [moment.pose] if moment.pose else []
+        learner.know(self.folder.images)
+        return name
+
     def _begun(self, image: Image) -> Learner:
-        self._image_size = image.size
         learner = Learner(self.search, image.size, self._range_m, self._goal_px)
         if self.folder.images:  # of a run before
             learner.know(self.folder.images)

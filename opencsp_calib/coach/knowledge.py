@@ -5,7 +5,7 @@ calibration that follows; before there are enough views, from a rough camera.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -59,6 +59,8 @@ class Knowledge:
         That it was chosen from.
     goal, information
         For what a further view would be worth: see `gain_of`.
+    glimpsed : int
+        Views counted by `having_seen`.
     """
 
     board: Board
@@ -74,6 +76,7 @@ class Knowledge:
     possible: Candidates = field(repr=False)
     goal: ProjectionGoal = field(repr=False)
     information: Matrix = field(repr=False)
+    glimpsed: int = 0
 
     @property
     def done(self) -> bool:
@@ -97,13 +100,21 @@ class Knowledge:
 
     def gain_of(self, pose: Pose) -> float:
         """Part of the expected variance of projections that a view like this would take away."""
+        return float(self.goal.gains(self.information, self._told_by(pose)[None])[0])
+
+    def having_seen(self, pose: Pose) -> "Knowledge":
+        """With a view like this counted, as long as it has not been learnt from."""
+        return replace(self, information=self.information + self._told_by(pose), glimpsed=self.glimpsed + 1)
+
+    def _told_by(self, pose: Pose) -> Matrix:
         seen = detection_from(self.camera, self.board, pose)
-        told = view_information(self.camera, self.board, [seen], [pose], options=SHAPED, sigma_px=SIGMA_PX)
-        return float(self.goal.gains(self.information, told)[0])
+        return np.asarray(
+            view_information(self.camera, self.board, [seen], [pose], options=SHAPED, sigma_px=SIGMA_PX)[0]
+        )
 
     def adds(self, gain: float) -> bool:
         """Whether a view of that gain is worth its photograph: half of what an average view has brought."""
-        worth = 0.5 / (len(self.views) + 1)
+        worth = 0.5 / (len(self.views) + self.glimpsed + 1)
         return gain >= (min(worth, 0.5 * self.next_view.gain) if self.next_view else worth)
 
 
