@@ -98,6 +98,8 @@ class Detection:
 
     def keeping(self, mask: Mask) -> "Detection":
         """Only the corners where the mask (n,) is true."""
+        if len(mask) == len(self) and mask.all():
+            return self
 
         def pick(values: Floats | None) -> Floats | None:
             return None if values is None else values[mask]

@@ -55,8 +55,8 @@ class OpenCVModel(LensModel):
         d = _padded(distortion)
         plane = self._on_plane(points, distortion)
         bent = _bent(plane, d)
-        by_plane, by_coefficients = _bent_jacobians(plane, d)
-        if d[12] or d[13] or len(distortion) == len(NAMES):
+        by_plane, by_coefficients = _bent_jacobians(plane, d, len(distortion))
+        if len(distortion) == len(NAMES):
             by_bent, by_tilt = tilt_jacobian(bent, d[12], d[13])
             bent = tilted(bent, tilt_matrix(d[12], d[13]))
             by_plane = by_bent @ by_plane
@@ -65,7 +65,7 @@ class OpenCVModel(LensModel):
         by_point = np.empty((len(points), 2, 3))
         by_point[:, :, :2] = by_plane / points[:, 2, None, None]
         by_point[:, :, 2] = -(by_point[:, :, :2] @ plane[:, :, None])[:, :, 0]
-        return bent, by_point, by_coefficients[:, :, : len(distortion)]
+        return bent, by_point, by_coefficients
 
     def _undistorted(self, plane: Floats, distortion: Params, tolerance: float) -> Points:
         if not distortion.any():  # where solvers start: dozens of times, with focal lengths to choose from
@@ -124,8 +124,8 @@ def _bent(plane: Floats, d: Params) -> Floats:
     )
 
 
-def _bent_jacobians(plane: Floats, d: Params) -> tuple[Floats, Floats]:
-    """Derivatives of `_bent`: (N, 2, 2) by the plane's coordinates, (N, 2, 14) by the coefficients."""
+def _bent_jacobians(plane: Floats, d: Params, count: int) -> tuple[Floats, Floats]:
+    """Derivatives of `_bent`: (N, 2, 2) by the plane's coordinates, (N, 2, count) by the first coefficients."""
     x, y = plane.T
     p1, p2 = d[2:4]
     s1, s2, s3, s4 = d[8:12]
@@ -139,16 +139,21 @@ def _bent_jacobians(plane: Floats, d: Params) -> tuple[Floats, Floats]:
     by_plane[:, 0, 1] = common_x * y + 2 * p1 * x + 2 * p2 * y
     by_plane[:, 1, 0] = common_y * x + 2 * p1 * x + 2 * p2 * y
     by_plane[:, 1, 1] = radial + common_y * y + 6 * p1 * y + 2 * p2 * x
-    by_coefficients = np.zeros((len(plane), 2, len(NAMES)))
-    for index, factor in ((0, r2), (1, r2**2), (4, r2**3)):
-        by_coefficients[:, :, index] = plane * (factor / denominator)[:, None]
-    for index, factor in ((5, r2), (6, r2**2), (7, r2**3)):
-        by_coefficients[:, :, index] = plane * (-radial * factor / denominator)[:, None]
-    by_coefficients[:, 0, 2] = by_coefficients[:, 1, 3] = 2 * x * y
-    by_coefficients[:, 0, 3] = r2 + 2 * x * x
-    by_coefficients[:, 1, 2] = r2 + 2 * y * y
-    by_coefficients[:, 0, 8] = by_coefficients[:, 1, 10] = r2
-    by_coefficients[:, 0, 9] = by_coefficients[:, 1, 11] = r2**2
+    by_coefficients = np.zeros((len(plane), 2, count))
+    powers = (r2, r2 * r2, r2 * r2 * r2)
+    for index, factor in zip((0, 1, 4), powers, strict=True):
+        if index < count:
+            by_coefficients[:, :, index] = plane * (factor / denominator)[:, None]
+    for index, factor in zip((5, 6, 7), powers, strict=True):
+        if index < count:
+            by_coefficients[:, :, index] = plane * (-radial * factor / denominator)[:, None]
+    if count > 2:
+        by_coefficients[:, 0, 2] = by_coefficients[:, 1, 3] = 2 * x * y
+        by_coefficients[:, 0, 3] = r2 + 2 * x * x
+        by_coefficients[:, 1, 2] = r2 + 2 * y * y
+    if count > 8:
+        by_coefficients[:, 0, 8] = by_coefficients[:, 1, 10] = r2
+        by_coefficients[:, 0, 9] = by_coefficients[:, 1, 11] = r2 * r2
     return by_plane, by_coefficients
 
 
@@ -173,7 +178,7 @@ def _newton(target: Floats, guess: Floats, d: Params, tolerance: float) -> Float
             error = _bent(found, d) - target
             if not (np.abs(error) > 0.1 * tolerance).any():
                 break
-            (a, b), (c, e) = np.moveaxis(_bent_jacobians(found, d)[0], 0, -1)
+            (a, b), (c, e) = np.moveaxis(_bent_jacobians(found, d, 0)[0], 0, -1)
             step = np.column_stack([e * error[:, 0] - b * error[:, 1], a * error[:, 1] - c * error[:, 0]])
             found = found - step / (a * e - b * c)[:, None]
         error = _bent(found, d) - target

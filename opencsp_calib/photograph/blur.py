@@ -22,7 +22,7 @@ ALONG = (0.35, 0.5, 0.65)  # where an edge is crossed, as part of its length: fa
 CLEAR = 0.4  # of a square's height: half a profile reaches no nearer to the next edge
 LARGEST_HALF_PX = 14.0
 SIGMAS, FEWEST_SIGMAS = 5.0, 2.5  # half a profile, in edge widths: with less, its ends are not yet flat
-FEWEST_EDGES, MOST_EDGES = 8, 150  # each way; more tell nothing new
+FEWEST_EDGES, MOST_EDGES = 8, 64  # each way; more tell nothing new
 INTERPOLATION_PX2 = 1 / 6  # what sampling between pixels adds to the variance: that of the triangle that bilinear is
 
 

@@ -51,7 +51,7 @@ class CheckerboardDetector:
     def detect(self, image: Image, board: Board) -> Detection:
         """The corners that can be told for certain; fewer than all, or none, with the reason."""
         best, largest, whole = Detection.nothing(""), None, False
-        for level in levels(image):
+        for level in levels(image, len(board.points)):
             grids = found_grids(level, board)
             fits = [fit for grid in grids if (fit := placed(level.grey, grid, board))]
             fits.sort(key=lambda fit: fit.square_px, reverse=True)

@@ -12,6 +12,8 @@ from opencsp_calib.image import Image
 __all__ = ["Level", "finest_level", "levels"]
 
 FIRST_LEVEL_PX = 600_000  # large enough for 1000 corners, small enough for 10 ms
+QUICK_LEVEL_PX, PX_A_CORNER = 150_000, 600  # squares are 10 px wide where the board fills a sixth of the image
+QUICK_FACTOR = 4  # with more, corners are known to no more than two pixels of the photograph
 LARGEST_LEVEL_PX = 4_500_000  # bounds time and memory for any photograph: a level costs 15 ms and 40 MB a megapixel
 LONGEST_SIDE_PX = 30_000  # OpenCV's `remap` cannot address more than 32767
 SMALLEST_SIDE_PX = 16  # less shows no board
@@ -50,13 +52,19 @@ class Level:
         return np.invert(pixels) if inverted else pixels
 
 
-def levels(image: Image) -> Iterator[Level]:
+def levels(image: Image, corners: int) -> Iterator[Level]:
     """Reduced photographs, in the order in which it pays to search them: small, finer and finer, then very coarse.
 
-    The coarse one at last is for a board that is out of focus; nothing else needs it.
+    The first is the smaller, the fewer corners are looked for. The coarse one at last is for a board that is out of
+    focus; nothing else needs it.
     """
     allowed = _allowed(image)
-    first = next(f for f in allowed if image.pixels.size <= FIRST_LEVEL_PX * f**2)
+
+    def smallest(area: int) -> int:
+        return next(f for f in allowed if image.pixels.size <= area * f**2)
+
+    quick = smallest(max(QUICK_LEVEL_PX, PX_A_CORNER * corners))
+    first = min(quick, max(smallest(FIRST_LEVEL_PX), QUICK_FACTOR))
     finer = [f for f in reversed(allowed) if f <= first]
     for factor in [*finer, 2 * first]:
         if min(image.size) >= SMALLEST_SIDE_PX * factor:

@@ -34,16 +34,16 @@ def _first_row_is_last(grey: NDArray[np.float32], grid: Floats) -> bool:
     whole = known(second)[:-1] & known(second)[1:] & known(outer)[:-1] & known(outer)[1:]
     if whole.sum() < 2 * FEWEST_TELLING:
         return False
-    inside, squares = (
-        _levels(grey, _between(upper, lower, 0.5)[whole]) for upper, lower in ((second, first), (first, outer))
+    ends = [_between(first, outer, 1 + beyond)[whole] for beyond in (-AT, AT, BEYOND)]
+    inside, squares, *at_ends = sample(
+        grey, np.stack([_between(second, first, 0.5)[whole], _between(first, outer, 0.5)[whole], *ends])
     )
     dark, white = np.minimum(inside, squares), np.maximum(inside, squares)
     middle = (dark.mean() + white.mean()) / 2
     telling = squares < middle  # where the next square outwards would be white, all is as if the board ended
     if telling.sum() < FEWEST_TELLING or ((inside < middle) == telling).any():
         return False
-    ends = [_between(first, outer, 1 + beyond)[whole] for beyond in (-AT, AT, BEYOND)]
-    nearest_to_white = [(_levels(grey, end) - dark) / (white - dark) for end in ends]
+    nearest_to_white = [(level - dark) / (white - dark) for level in at_ends]
     still_dark = nearest_to_white[0][telling] < NEAR
     white_beyond = np.abs(np.array(nearest_to_white[1:]) - 1) < NEAR
     return bool(still_dark.all() and white_beyond.all() and _within(grey, ends[-1]).all())
@@ -53,10 +53,6 @@ def _between(line: Pixels, next_line: Pixels, part: float) -> Pixels:
     """(n - 1, 2) in the middle of each column of squares, so far from one line to the next."""
     moved = line + part * (next_line - line)
     return np.asarray((moved[:-1] + moved[1:]) / 2)
-
-
-def _levels(grey: NDArray[np.float32], pixels: Pixels) -> Floats:
-    return sample(grey, pixels[:, None])[:, 0]
 
 
 def _within(grey: NDArray[np.float32], pixels: Pixels) -> Mask:

@@ -92,17 +92,18 @@ def _readings(grey: NDArray[np.float32], grid: Floats, board: Board) -> Iterator
     columns, rows = board.grid
     all_ids = np.arange(columns * rows).reshape(rows, columns)
     sides = sides_seen(grey, grid)
-    for turns in range(4):
-        reading = np.rot90(grid, turns)
-        height, width = reading.shape[:2]
+    down, on = _mean_steps(grid)
+    for turns, begins_dark in enumerate(_begin_dark(grey, grid)):
+        height, width = grid.shape[:2] if turns % 2 == 0 else grid.shape[1::-1]
         top, right, bottom, left = (sides[(side + turns) % 4] for side in range(4))
-        begins_dark, roll_deg = _begins_dark(grey, reading), _roll_deg(reading)
         first_rows, first_columns = _offsets(height, rows, top, bottom), _offsets(width, columns, left, right)
         certain = len(first_rows) == len(first_columns) == 1
+        roll_deg = _roll_deg(down, on)
         for row, column in product(first_rows, first_columns):
             ids = all_ids[row : row + height, column : column + width]
             dark_first = begins_dark == ((row + column) % 2 == 0)
             yield _Reading(np.rot90(ids, -turns), certain, dark_first, roll_deg)
+        down, on = -on, down  # as `rot90` turns the grid
 
 
 def _offsets(found: int, wanted: int, begins: bool, ends: bool) -> Sequence[int]:
@@ -130,23 +131,30 @@ def _same(one: Ids, other: Ids, alike: list[Ids]) -> bool:
     return any(np.array_equal(turned[one], other) for turned in alike)
 
 
-def _begins_dark(grey: NDArray[np.float32], reading: Floats) -> bool:
-    """Whether the squares like the one at the first corner are the dark ones."""
-    middles = (reading[:-1, :-1] + reading[1:, :-1] + reading[:-1, 1:] + reading[1:, 1:]) / 4
+def _begin_dark(grey: NDArray[np.float32], grid: Floats) -> list[bool]:
+    """Whether the squares like the one at the first corner are the dark ones, at 0 to 3 quarter turns of the grid."""
+    middles = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
     row, column = np.nonzero(known(middles))
     levels = sample(grey, middles[row, column][:, None])[:, 0]
-    like_first = (row + column) % 2 == 0
-    return bool(levels[like_first].mean() < levels[~like_first].mean())
+    even = (row + column) % 2 == 0
+    even_dark = bool(levels[even].mean() < levels[~even].mean())
+    down, on = middles.shape[0] - 1, middles.shape[1] - 1
+    return [even_dark == (place % 2 == 0) for place in (0, on, down + on, down)]
+
+
+def _mean_steps(grid: Floats) -> tuple[Floats, Floats]:
+    """(2,) px one row down, and one column on, on average."""
+    down, on = (np.nanmean(step, axis=(0, 1)) for step in steps(grid))
+    return down, on
 
 
 def _handedness(grid: Floats) -> float:
-    down, on = (np.nanmean(step, axis=(0, 1)) for step in steps(grid))
+    down, on = _mean_steps(grid)
     return float(on[0] * down[1] - on[1] * down[0])
 
 
-def _roll_deg(reading: Floats) -> float:
-    """How far the reading is turned in the image: 0 where columns run to the right and rows run down."""
-    down, on = (np.nanmean(step, axis=(0, 1)) for step in steps(reading))
+def _roll_deg(down: Floats, on: Floats) -> float:
+    """How far a reading is turned in the image: 0 where columns run to the right and rows run down."""
     x, y = on / np.linalg.norm(on) + np.array([down[1], -down[0]]) / np.linalg.norm(down)
     return float(np.degrees(np.arctan2(y, x)))
 

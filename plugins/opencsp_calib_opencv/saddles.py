@@ -13,6 +13,7 @@ __all__ = ["Saddles", "corner_like", "saddle_pixels"]
 RING_PX = 4.0
 MOST_UNLIKENESS = 0.22  # opposite places differ by less even where noise is a fifth of the contrast
 LEAST_CONTRAST = 0.01  # two to three grey levels of 8 bits
+SMALLEST_STRENGTH = 1e-30  # of a saddle; flat places have none
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +48,13 @@ def saddle_pixels(grey: NDArray[np.float32], most: int) -> Pixels:
     second, slope, one = (np.array(k, dtype=np.float32) for k in ([1, -2, 1], [-0.5, 0, 0.5], [1]))
     xx, yy = cv2.sepFilter2D(grey, -1, second, one), cv2.sepFilter2D(grey, -1, one, second)
     xy = cv2.sepFilter2D(grey, -1, slope, slope)
-    strength = xy * xy - xx * yy
-    peak = (strength >= cv2.dilate(strength, np.ones((5, 5), np.uint8))) & (strength > 0)
+    strength = xy * xy
+    strength -= xx * yy
+    around = cv2.dilate(strength, np.ones((5, 5), np.uint8))
+    peaks = cv2.compare(strength, cv2.max(around, SMALLEST_STRENGTH), cv2.CMP_GE)
     border = int(RING_PX) + 2
-    inside = np.zeros_like(peak)
-    inside[border:-border, border:-border] = True
-    y, x = np.nonzero(peak & inside)
+    inside = cv2.findNonZero(peaks[border:-border, border:-border])
+    x, y = np.zeros((2, 0), dtype=np.int64) if inside is None else inside.reshape(-1, 2).T.astype(np.int64) + border
     if len(x) > most:
         strongest = np.argpartition(strength[y, x], -most)[-most:]
         x, y = x[strongest], y[strongest]

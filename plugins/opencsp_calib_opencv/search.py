@@ -6,6 +6,7 @@ from opencsp_calib_opencv.grid import known, trimmed
 from opencsp_calib_opencv.growth import grown, pruned
 from opencsp_calib_opencv.lattice import grids, links
 from opencsp_calib_opencv.levels import Level
+from opencsp_calib_opencv.margins import sides_seen
 from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.saddles import corner_like, saddle_pixels
 from opencsp_calib_opencv.smoothness import smooth_part
@@ -35,10 +36,17 @@ def found_grids(level: Level, board: Board) -> list[Floats]:
         if max(seed.shape) <= MUCH_LONGER * longest:
             grid = pruned(level.grey, seed)
             if _count(grid) >= FEWEST_CORNERS:
-                grid = trimmed(smooth_part(grown(level.grey, grid, saddles, longest)))
+                whole = _is_whole(level, grid, board)
+                grid = trimmed(smooth_part(grid if whole else grown(level.grey, grid, saddles, longest)))
         if _count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
             found.append(grid)
     return sorted(found, key=_count, reverse=True)
+
+
+def _is_whole(level: Level, grid: Floats, board: Board) -> bool:
+    """Whether the board is found to its last corner and seen to end on all sides: nothing is left to be put in."""
+    complete = sorted(grid.shape[:2]) == sorted(board.grid) and bool(known(grid).all())
+    return complete and all(sides_seen(level.grey, grid))
 
 
 def _overlap(grid: Floats, other: Floats) -> bool:
