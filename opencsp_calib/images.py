@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
+from opencsp_calib.image_bytes import fault
 from opencsp_calib.opencv import opencv
 
 if TYPE_CHECKING:
@@ -176,14 +177,15 @@ def decode_image(encoded: EncodedImage) -> Image:
     Raises
     ------
     InputError
-        If they are cut short, or no image.
+        If they are cut short, damaged, several pages, or no image.
     MissingDependencyError
         If OpenCV is not installed.
     """
     cv2 = opencv()
     path, data = encoded.file.path, encoded.data
-    if _cut_short(data):
-        raise InputError(f"{path} is cut short; copy it again from the camera")
+    against = fault(data)
+    if against:
+        raise InputError(f"{path} {against}")
     flags = cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH | cv2.IMREAD_IGNORE_ORIENTATION
     try:
         pixels = cv2.imdecode(np.frombuffer(data, dtype=np.uint8), flags)
@@ -194,15 +196,6 @@ def decode_image(encoded: EncodedImage) -> Image:
     if pixels.dtype not in (np.uint8, np.uint16):
         raise InputError(f"{path} has {pixels.dtype} pixels; save it with 8 or 16 bits")
     return Image(encoded.file.name, pixels, encoded.sha256)
-
-
-def _cut_short(data: bytes) -> bool:
-    """Whether a PNG or JPEG lacks its end: the decoder would fill the rest with grey and say nothing."""
-    if data.startswith(b"\x89PNG"):
-        return b"IEND" not in data[-64:]
-    if data.startswith(b"\xff\xd8"):
-        return b"\xff\xd9" not in data[-4096:]
-    return False
 
 
 def write_image(pixels: NDArray[Any], path: str | os.PathLike[str]) -> None:

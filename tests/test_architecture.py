@@ -18,7 +18,7 @@ TIERS = (
     "models",
     "camera rotations convex_hull board",
     "pose",
-    "image detection options",
+    "image image_bytes detection options",
     "view_json",
     "calibration",
     "images corner_table unknowns triangular schur normal_equations subpix",

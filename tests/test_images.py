@@ -94,3 +94,31 @@ def test_nothing_found_says_what(given: str, message: str, tmp_path: Path, monke
 def test_written_images_are_lossless(tmp_path: Path) -> None:
     write_image(RAMP, tmp_path / "w.png")
     np.testing.assert_array_equal(read(tmp_path / "w.png"), RAMP)
+
+
+def test_a_damaged_png_is_one_clear_line_and_none_of_the_decoders(tmp_path: Path, capfd) -> None:
+    data = bytearray(cv2.imencode(".png", np.random.default_rng(0).integers(0, 255, (99, 88)).astype(np.uint8))[1])
+    for place in (20, len(data) // 2):
+        data[place] ^= 0x5A
+        (tmp_path / "hit.png").write_bytes(data)
+        with pytest.raises(InputError, match=r"hit\.png is damaged.*copy it again"):
+            read(tmp_path / "hit.png")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_of_several_pages_none_is_taken_silently(tmp_path: Path) -> None:
+    cv2.imwritemulti(str(tmp_path / "two.tif"), [np.zeros((20, 30), np.uint8)] * 2)
+    with pytest.raises(InputError, match=r"two\.tif has 2 pages"):
+        read(tmp_path / "two.tif")
+
+
+def test_a_preview_in_a_tiff_is_no_page(tmp_path: Path) -> None:
+    path = tmp_path / "previewed.tif"
+    cv2.imwritemulti(str(path), [np.full((20, 30), 7, np.uint8), np.zeros((5, 5), np.uint8)])
+    data = bytearray(path.read_bytes())
+    (first,) = struct.unpack_from("<I", data, 4)
+    (entries,) = struct.unpack_from("<H", data, first)
+    (second,) = struct.unpack_from("<I", data, first + 2 + 12 * entries)
+    struct.pack_into("<HHII", data, second + 2, 254, 4, 1, 1)  # its first entry says: a reduced image
+    path.write_bytes(data)
+    assert (read(path) == 7).all()

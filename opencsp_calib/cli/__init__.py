@@ -57,7 +57,7 @@ def run(arguments: list[str]) -> int:
     except CalibError as error:
         complain(str(error))
         return error.exit_code
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, typer.Abort):  # the second from older parsers
         outcome = INTERRUPTED
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does: nobody is left to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -1,0 +1,50 @@
+"""A file is there whole or not at all, whatever happens while it is written."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from opencsp_calib.atomic import replacing
+
+STOPPED_WHILE_SAVING = """
+import signal, sys
+import h5py
+from opencsp_calib import Camera
+from opencsp_calib.cli import run
+
+camera = Camera("left", "opencv4", [2700, 2700, 830, 630, -0.2, 0.1, 0, 0], (1626, 1236))
+written = h5py.Group.create_dataset
+
+def stopped(self, name, *args, **options):
+    signal.raise_signal(signal.SIGINT)  # as Ctrl-C does: Python's handler runs at the next instruction
+    return written(self, name, *args, **options)
+
+h5py.Group.create_dataset = stopped
+sys.exit(run(["convert", "--params", "fx=2700,fy=2700,cx=830,cy=630", "--model", "pinhole", "--image-size", "1626x1236",
+              sys.argv[1]]))
+"""
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+def test_what_stood_there_stays_when_writing_is_stopped(error: type[BaseException], tmp_path: Path) -> None:
+    path = tmp_path / "camera.h5"
+    path.write_text("before")
+
+    def write_half() -> None:
+        with replacing(path) as temporary:
+            temporary.write_text("aft")
+            raise error
+
+    with pytest.raises(error):
+        write_half()
+    assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
+
+
+def test_control_c_in_the_middle_of_saving_leaves_nothing_and_says_so(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", STOPPED_WHILE_SAVING, str(tmp_path / "camera.h5")], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr.strip()) == (1, "error: stopped; what was not finished was not written")
+    assert list(tmp_path.iterdir()) == []
