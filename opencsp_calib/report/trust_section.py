@@ -90,6 +90,8 @@ def range_plot(calibration: Calibration) -> "Figure":
         axes.plot(curve.ranges_m, values, color=ACCENT)
         axes.axvspan(near, far, color=ACCENT, alpha=0.15, label="boards were here")
         axes.set(xscale="log", xlabel="range (m)", ylabel=f"one standard deviation\n({unit}, rms over the image)")
+        for write_by in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+            write_by(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "125" else "")  # not powers of ten
         axes.set_ylim(bottom=0)
         axes.legend(frameon=False, fontsize=8)
     return figure
