@@ -1,6 +1,6 @@
 """The decision whether to solve for the board's shape: how often it is right, and what it costs.
 
-Claims
+Claim
     `board_shape.decide` solves for the shape where that makes the camera better, and leaves the board alone where it is
     flat; halves alone, which share the bias of a bent board, do not tell. Deciding costs at most half of a solution
     with the shape, at 50 views.
@@ -12,7 +12,7 @@ Way
     would solve for the shape. Times are of one processor, the quickest of five; what deciding costs is all of `decide`
     but the two solutions; the camera's uncertainty, which is needed anyhow, is listed apart.
 
-Run ``python validation/board_decision.py > validation/results/board_decision.md``: ten minutes.
+Run ``python validation/bench.py board_decision``: ten minutes.
 """
 
 import time
@@ -108,8 +108,6 @@ def times_of(observations: Observations, options: SolveOptions) -> tuple[float, 
 
 
 if __name__ == "__main__":
-    print("# The decision of the board's shape\n\n2026-11-28, 2 cores.\n")
-    print("\n".join((__doc__ or "").split("\n")[2:-2]))
     with blas_on_one_thread():  # as in the pipeline
         cost()
         decision_table()

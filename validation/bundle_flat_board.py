@@ -2,7 +2,8 @@
 
 Claim
     Errors with the board's shape free are at most 1.1 times as much larger than errors with the board flat as the
-    covariances say they must be.
+    covariances say they must be, in the mean of fx, fy, cx, cy and projections (one ratio of 100 worlds is known to
+    about 7 %, one sigma).
 
 Way
     The seed's procedure (demo camera, 22 x 19 corners, half of the views turned), 100 worlds at each number of views,

@@ -13,8 +13,8 @@ Way
     way round. "Halves": their two cameras over the image, frames aligned. Errors: solved minus true. Seconds are of all
     processors together, mrcal's and lensboy's with the start of their Python.
 
-lensboy wants another OpenCV than ours, so that it has an environment of its own (``pip install lensboy==4.0.3``). Run
-``python validation/rivals.py PYTHON_THAT_HAS_LENSBOY [FOLDER OF SHARED DATA] > validation/results/rivals.md``.
+lensboy wants another OpenCV than ours, so that it has an environment of its own (``pip install lensboy==4.0.3``), whose
+Python ``LENSBOY_PYTHON`` names; without it, its rows are left out. Run ``python validation/bench.py rivals``.
 """
 
 import os
@@ -38,6 +38,7 @@ from opencsp_calib.resampling import held_out
 from opencsp_calib.synthetic import bowed
 
 MODEL = "opencv4"
+DATA = Path(os.environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 WORKER = """
 import sys
 import lensboy as lb
@@ -61,8 +62,9 @@ np.savez(
 """
 
 
-def lensboy(python: str, options: SolveOptions, observations: Observations) -> Calibration:
+def lensboy(python: str | None, options: SolveOptions, observations: Observations) -> Calibration:
     """What lensboy makes of it."""
+    assert python
     detections = observations.detections
     with tempfile.TemporaryDirectory() as folder:
         given, solved = Path(folder) / "given.npz", Path(folder) / "solved.npz"
@@ -93,10 +95,10 @@ def ours(solver: str, options: SolveOptions, observations: Observations) -> Cali
     return installed().solver(solver).solve(observations, MODEL, options)
 
 
-def ways(python: str) -> dict[str, Callable[[Observations], Calibration]]:
+def ways(python: str | None) -> dict[str, Callable[[Observations], Calibration]]:
     """All that are compared."""
     flat, warp, free = (SolveOptions(board_shape=shape) for shape in ("flat", "warp", "free"))
-    return {
+    found = {
         "mrcal, flat": partial(ours, "mrcal", flat),
         "lensboy, flat": partial(lensboy, python, flat),
         "bundle, flat": partial(ours, "bundle", flat),
@@ -108,6 +110,7 @@ def ways(python: str) -> dict[str, Callable[[Observations], Calibration]]:
             ours, "bundle", SolveOptions(board_shape="free", pixel_aspect=1.0)
         ),
     }
+    return found if python else {name: way for name, way in found.items() if not name.startswith("lensboy")}
 
 
 def seconds() -> float:
@@ -115,7 +118,7 @@ def seconds() -> float:
     return sum(os.times()[:4])
 
 
-def sandia(folder: Path, python: str) -> None:
+def sandia(folder: Path, python: str | None) -> None:
     """Print Sandia's table."""
     observations = detect(folder / "sandia_checkerboard" / "*.png", SANDIA_BOARD)
     even, odd = observations.keeping(EVEN), observations.keeping(ODD)
@@ -136,7 +139,7 @@ def sandia(folder: Path, python: str) -> None:
         )
 
 
-def bowed_board(python: str) -> None:
+def bowed_board(python: str | None) -> None:
     """Print the table of the rendered board."""
     with tempfile.TemporaryDirectory() as folder:
         photographs(Path(folder), 0.0015, 1)
@@ -157,7 +160,5 @@ def bowed_board(python: str) -> None:
 
 
 if __name__ == "__main__":
-    print("# Side by side with mrcal's warp and with lensboy\n\n2026-11-28, 2 cores.\n")
-    print("\n".join((__doc__ or "").split("\n")[2:-4]))
-    sandia(Path(sys.argv[2] if len(sys.argv) > 2 else "../shared/data"), sys.argv[1])
-    bowed_board(sys.argv[1])
+    sandia(DATA, os.environ.get("LENSBOY_PYTHON"))
+    bowed_board(os.environ.get("LENSBOY_PYTHON"))

@@ -1,15 +1,13 @@
-"""Do the sigmas hold? Of many worlds with known cameras, and on Sandia's photographs.
+"""Whether the sigmas hold, in many worlds with known cameras, and on Sandia's photographs.
 
-Claims
+Claim
     95 % intervals (Student's t with views - 1 degrees of freedom, times the jackknife sigma) hold the truth in 92 to
     98 % of cases, pooled over fx, fy, cx, cy and the aligned projections at nine points, and no single quantity in
     under 88 %, whether noise is independent, correlated between neighbours, or the board flexes from view to view;
     so does the honest sigma, which is the jackknife's unless that is below the residual one on the whole. The residual
     sigma does not hold. With the board's shape solved for from as few as 10 views, each view weighs so much that the
-    jackknife is a little too large: 97.9 to 98.5 %.
-
-    On Sandia's photographs the residual sigma of cx is some 25 times too small; one Newton step a view gives what
-    solving again without it gives; and the result hangs on view 010.
+    jackknife is a little too large: 97.9 to 98.5 %. On Sandia's photographs the residual sigma of cx is some 25
+    times too small; one Newton step a view gives what solving again without it gives; and the result hangs on view 010.
 
 Way
     Worlds: the demo camera, 12 x 9 corners of 75 mm, the seed's poses drawn anew for each world, the solver ``bundle``.
@@ -17,10 +15,10 @@ Way
     corner to corner), two axes each, frames aligned by a turn as `compare` does: 4 + 18 quantities. A share of 200
     worlds is known to 1.5 %, one sigma, for a single quantity.
 
-Run ``python validation/uncertainty.py [FOLDER OF SHARED DATA] > validation/results/uncertainty.md``: 15 minutes.
+Times are of one processor. Run ``python validation/bench.py uncertainty``: 15 minutes.
 """
 
-import sys
+import os
 import time
 from pathlib import Path
 
@@ -54,6 +52,7 @@ NOISE = {
     "board flexes by 0.2 mm rms, 0.03 px": {"noise_px": 0.03, "flex_m": 2e-4},
 }
 SHAPES = {"flat": (10, 20, 50), "free": (10,)}
+DATA = Path(os.environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SANDIA = Checkerboard(18, 23, 0.05)
 
 
@@ -98,7 +97,7 @@ def coverage(views: int, noise: dict[str, float], shape: str) -> dict[str, np.nd
 
 def coverage_table() -> None:
     """All of them."""
-    print(f"\n## How often 95 % intervals hold the truth, {WORLDS} worlds each\n")
+    print(f"\n### How often 95 % intervals hold the truth, {WORLDS} worlds each\n")
     print("| board | views | noise | residual | jackknife | least of 22 | honest | least of 22 |")
     print("|---|---|---|---|---|---|---|---|")
     for shape, counts in SHAPES.items():
@@ -116,7 +115,7 @@ def coverage_table() -> None:
 def sandia_tables(folder: Path) -> None:
     """Sigmas, halves and influence of three ways to solve."""
     seen = detect(folder / "sandia_checkerboard", SANDIA)
-    print("\n## Sandia's ten photographs, model-fit corners, equal weights\n")
+    print("### Sandia's ten photographs, model-fit corners, equal weights\n")
     print("| board | pixels | rms px | fx | cx | residual sigma fx, cx | jackknife fx, cx | honest fx, cx |", end="")
     print(" projection, honest, rms over image | halves, median (predicted) | flatness | pitch y/x | shear |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|---|")
@@ -127,7 +126,7 @@ def sandia_tables(folder: Path) -> None:
     options = SolveOptions(board_shape="free", pixel_aspect=1.0)
     result = with_uncertainty(solved(seen, options))
     again = np.array([solved(rest, options).camera.params for rest in leaving_each_out(seen)]) - result.camera.params
-    print("\n### Influence of each view, board free and pixels square\n")
+    print("\n#### Influence of each view, board free and pixels square\n")
     print("| left out | its rms px | moves cx, one Newton step | solved again | moves fx | solved again |", end="")
     print(" over the image, rms px | worst px | share |")
     print("|---|---|---|---|---|---|---|---|---|")
@@ -165,7 +164,7 @@ def sandia_row(seen: Observations, options: SolveOptions, pixels: str) -> None:
 def jackknife_cost() -> None:
     """Of all left-out views, against one solution."""
     print(
-        "\n## What it costs, 50 views of 378 corners\n\n| board | solve s | uncertainty s | ratio |\n|---|---|---|---|"
+        "\n### What it costs, 50 views of 378 corners\n\n| board | solve s | uncertainty s | ratio |\n|---|---|---|---|"
     )
     board = Checkerboard(21, 18, 0.05)
     observations = observe(CAMERA, board, seed_poses(board, CAMERA, 50, 1), noise_px=0.05, rng=1)
@@ -182,9 +181,7 @@ def jackknife_cost() -> None:
 
 
 if __name__ == "__main__":
-    print("# Uncertainty\n\n2026-11-28, 2 cores (times are of one processor).\n")
-    print("\n".join((__doc__ or "").split("\n")[2:-2]))
     with blas_on_one_thread():  # as in the pipeline
-        sandia_tables(Path(sys.argv[1] if len(sys.argv) > 1 else "../shared/data"))
+        sandia_tables(DATA)
         jackknife_cost()
         coverage_table()
