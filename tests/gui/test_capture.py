@@ -40,6 +40,11 @@ def window(chromium, scene: Path, tmp_path: Path, monkeypatch) -> Iterator[Windo
         yield opened
 
 
+def open_tab(window: Window) -> None:
+    window.browser.find_element("xpath", "//div[contains(@class,'q-tab')][normalize-space()='Capture']").click()
+    window.until(lambda: window.element("capture-start").is_displayed())
+
+
 def taken(window: Window) -> int:
     words = window.element("capture-known").text.split(" of ")
     return int(words[0]) if words[0] else 0
@@ -47,9 +52,8 @@ def taken(window: Window) -> int:
 
 def test_from_the_live_picture_straight_to_a_calibration(window: Window, scene: Path) -> None:
     window.describe("captured", 9, 6, 30)
-    window.browser.find_element("xpath", "//div[contains(@class,'q-tab')][normalize-space()='Capture']").click()
+    open_tab(window)
     settings = f"ImageFilename={scene}\nImageFileMode=On\nTestImageSelector=Off\nAcquisitionFrameRate=2"
-    window.until(lambda: window.element("capture-start").is_displayed())
     window.element("capture-settings").send_keys(settings)
     window.until(lambda: window.enabled("capture-start"))
     window.click("capture-start")
@@ -80,8 +84,7 @@ def test_from_the_live_picture_straight_to_a_calibration(window: Window, scene: 
 
 def test_a_camera_that_is_not_there_is_one_sentence(window: Window) -> None:
     window.describe("captured", 9, 6, 30)
-    window.browser.find_element("xpath", "//div[contains(@class,'q-tab')][normalize-space()='Capture']").click()
-    window.until(lambda: window.element("capture-device").is_displayed())
+    open_tab(window)
     window.type("capture-device", "4711")
     window.until(lambda: window.enabled("capture-start"))
     window.click("capture-start")
