@@ -3,11 +3,13 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint docs bench pictures mutants coverage release clean help
+.PHONY: demo test pythons beside-opencsp lint docs bench pictures mutants coverage release clean help
 
 help:
 	@echo "make demo   render photographs, calibrate, write demo/camera.h5 and demo/report.html"
 	@echo "make test   lint, type-check and test everything"
+	@echo "make pythons   a selection of tests on the oldest and newest Python and dependencies, where they are here"
+	@echo "make beside-opencsp   install beside OpenCSP's own OpenCV and NumPy"
 	@echo "make docs   build the documentation into docs/_build"
 	@echo "make bench  run the studies in validation/"
 	@echo "make mutants, coverage   how well the tests test"
@@ -19,6 +21,14 @@ demo: $(VENV)/.core
 
 test: lint
 	$(BIN)/python -m pytest -n 2
+
+# The oldest dependencies that we support on the oldest Python, the newest on the newest that is here.
+pythons:
+	.ci/other-python 3.10 .ci/oldest.txt
+	.ci/other-python 3.13
+
+beside-opencsp:
+	.ci/beside-opencsp
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -151,7 +151,7 @@ def _step(camera: Camera, turned: Points, at: Vector, error: Pixels, damping: fl
     normal, slope = jacobian.T @ jacobian, jacobian.T @ error.ravel()
     normal[np.diag_indices(6)] *= 1.0 + damping
     try:
-        step = -np.linalg.solve(normal, slope)
+        step: Floats = np.asarray(-np.linalg.solve(normal, slope), dtype=np.float64)
     except np.linalg.LinAlgError:  # corners on one line of sight: nothing to be gained from here
         return np.zeros(6), 0.0
     return step, float(-slope @ step)

@@ -4,6 +4,7 @@ Boards are rendered, so that where each corner is in the image is known to 1e-4 
 """
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,6 +148,6 @@ def _rendered(board: Board, roll_deg: float, tilt_deg: float) -> tuple[Image, Po
     return render(CAMERA, board, pose, drawing=drawing, samples=2, name="rendered"), pose
 
 
-def _read_only(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def _read_only(pixels: NDArray[Any]) -> NDArray[Any]:
     pixels.flags.writeable = False
     return pixels

@@ -34,4 +34,4 @@ class GreyLevels:
             return np.array(frame.Array, dtype=np.uint8)
         deep = pylon.BitDepth(kind) > 8
         pixels = self._converters[16 if deep else 8].Convert(frame).GetArray()
-        return np.array(pixels, dtype=np.uint16 if deep else np.uint8)
+        return np.array(pixels, dtype=np.uint16) if deep else np.array(pixels, dtype=np.uint8)
