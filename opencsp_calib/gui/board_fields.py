@@ -25,13 +25,13 @@ GRID_POINTS = ("Grid points x", "Grid points y")
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session, fields = page.session, SettingFields(page.session)
-    fields.line("camera_name", "Camera name", "camera-name", "camera")
     with ui.element("div").classes("side-by-side"):
+        fields.line("camera_name", "Camera name", "camera-name", "camera")
         fields.option("board_kind", "Board", {name: name for name in sorted(installed().boards)})
-        square = fields.line("square_mm", "Square size in mm", "square-size", "50")
     with ui.element("div").classes("side-by-side") as grid:
         across = fields.line("grid_x", GRID_POINTS[0], "grid-x", "18")
         down = fields.line("grid_y", GRID_POINTS[1], "grid-y", "23")
+    square = fields.line("square_mm", "Square size in mm", "square-size", "50")
     with ui.element("div").classes("group") as markers:
         fields.line("marker_mm", "Marker size in mm", hint="40.5")
         fields.option("dictionary", "Dictionary", {name: name for name in DICTIONARIES})

@@ -31,7 +31,7 @@ def build(page: "Page") -> Callable[[], None]:
     session = page.session
     shown: list[Any] = [None]
     views = []
-    with ui.element("div").classes("report side"):
+    with ui.element("div").classes("report"), ui.element("div").classes("side"):
         for title, make, turn in (
             ("Seen from the camera", boards_before_camera, (0.6, 0.35)),
             ("Seen from the board", cameras_before_board, (0.6, 0.35)),

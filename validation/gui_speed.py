@@ -1,0 +1,163 @@
+"""How long the window takes against the command line, how soon it answers, and how much memory its server needs.
+
+Claim
+    50 photographs of 1626 x 1236: from Select to saved in at most 1.3 times the command line's time plus 2 s; the page
+    answers within 0.2 s meanwhile; the server stays under 1 GB with 500 photographs; the first page is there in under
+    2 s after the start.
+
+Way
+    Photographs of the demo, and for 500 ten of each, told apart by bytes after their end. Headless Chromium driven as
+    in the tests, so that uploads, pictures in the page and the download are in the time; the same files and options by
+    the command line in the same run. Answers are whole pages, asked for every 0.1 s while corners are looked for.
+    Memory is the most that the server's process ever held (VmHWM), Linux only; that of its worker stands beside it.
+
+Run ``python validation/gui_speed.py``: about ten minutes on two idle cores.
+"""
+
+import http.client
+import os
+import shutil
+import sys
+import tempfile
+import threading
+import time
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+from gui_window import Server, Window, run_cli
+
+from opencsp_calib.demo import make_demo
+from opencsp_calib.pipeline import usable_cores
+
+BOARD = "checkerboard:21x18:50mm"
+
+
+def browser(folder: Path) -> Any:
+    """Headless Chromium, with downloads going to the folder."""
+    from selenium import webdriver
+
+    options = webdriver.ChromeOptions()
+    options.binary_location = shutil.which("chromium") or ""
+    flags = "--headless=new --no-sandbox --disable-gpu --disable-background-networking --disable-dev-shm-usage"
+    for flag in (*flags.split(), "--window-size=1280,860", f"--user-data-dir={folder / 'profile'}"):
+        options.add_argument(flag)
+    options.add_experimental_option("prefs", {"download.default_directory": str(folder)})
+    return webdriver.Chrome(options=options, service=webdriver.ChromeService(shutil.which("chromedriver")))
+
+
+def first_page(folder: Path) -> float:
+    """Seconds from starting the program to its first page."""
+    begin = time.perf_counter()
+    with Server(folder) as server:
+        ask(server)
+        return time.perf_counter() - begin
+
+
+def ask(server: Server) -> float:
+    """Seconds that a whole page takes."""
+    begin, where = time.perf_counter(), urlsplit(server.address)
+    connection = http.client.HTTPConnection(where.hostname or "", where.port or 0, timeout=60)
+    connection.request("GET", f"/?{where.query}")
+    connection.getresponse().read()
+    connection.close()
+    return time.perf_counter() - begin
+
+
+class Asking(threading.Thread):
+    """Asks for the page again and again, and keeps how long each took."""
+
+    def __init__(self, server: Server) -> None:
+        super().__init__(daemon=True)
+        self.server, self.seconds, self.over = server, list[float](), threading.Event()
+
+    def run(self) -> None:
+        """Until it is over."""
+        while not self.over.wait(0.1):
+            self.seconds.append(ask(self.server))
+
+
+def by_window(window: Window, images: list[Path], *, asking: bool) -> tuple[float, list[float]]:
+    """Seconds from selecting to saved, and those that pages took meanwhile."""
+    window.describe("demo", 21, 18, 50)
+    asked = Asking(window.server)
+    begin = time.perf_counter()
+    window.select(images)
+    window.until(lambda: window.enabled("find-corners"), 600)
+    if asking:
+        asked.start()
+    window.click("find-corners")
+    window.until(lambda: window.status.startswith("The board is found"), 1200)
+    asked.over.set()
+    window.calibrate()
+    window.click("save-camera")
+    window.until(lambda: window.status.startswith("Camera saved"))
+    return time.perf_counter() - begin, asked.seconds
+
+
+def most_memory(process: int) -> tuple[float, float]:
+    """GB that the process, and its largest child, ever held."""
+
+    def held(number: int) -> float:
+        lines = Path(f"/proc/{number}/status").read_text(encoding="ascii").splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM")) / 1e6
+
+    children = Path(f"/proc/{process}/task/{process}/children").read_text(encoding="ascii").split()
+    return held(process), max((held(int(child)) for child in children), default=0.0)
+
+
+def main() -> None:
+    """Print the figures."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        images = list(make_demo(folder / "demo", 50, jobs=usable_cores()).images)
+        starts = sorted(first_page(_new(folder, f"start{n}")) for n in range(3))
+        begin = time.perf_counter()
+        run_cli("calibrate", *images, "--board", BOARD, "--name", "demo", "-o", folder / "cli.h5")
+        cli = time.perf_counter() - begin
+        chromium = browser(folder)
+        with Server(_new(folder, "fifty")) as server:
+            window = Window(chromium, server)
+            window.open()
+            alone, _ = by_window(window, images, asking=False)
+        with Server(_new(folder, "asked")) as server:
+            window = Window(chromium, server)
+            window.open()
+            _, answers = by_window(window, images, asking=True)
+        with Server(_new(folder, "many")) as server:
+            window = Window(chromium, server)
+            window.open()
+            many, _ = by_window(window, _many(images, _new(folder, "copies")), asking=False)
+            window.tab("Photographs")
+            own, worker = most_memory(server.process.pid)
+        chromium.quit()
+    answers.sort()
+    print("\n| what | measured | wanted |\n|---|---|---|")
+    print(f"| first page after start, median of 3 | {starts[1]:.2f} s | under 2 s |")
+    print(f"| 50 photographs, command line | {cli:.1f} s | |")
+    print(f"| 50 photographs, window | {alone:.1f} s | at most {1.3 * cli + 2:.1f} s |")
+    print(f"| whole pages meanwhile, median / 95 % / slowest of {len(answers)} | {answers[len(answers) // 2]:.3f} / "
+          f"{answers[int(0.95 * len(answers))]:.3f} / {answers[-1]:.3f} s | 0.2 s |")  # fmt: skip
+    print(f"| 500 photographs, window | {many:.0f} s | |")
+    print(f"| memory of the server with 500 / of its worker | {own:.2f} / {worker:.2f} GB | under 1 GB |")
+
+
+def _new(folder: Path, name: str) -> Path:
+    (folder / name).mkdir()
+    return folder / name
+
+
+def _many(images: list[Path], folder: Path) -> list[Path]:
+    copies = []
+    for image in images:
+        for number in range(10):
+            copy = folder / f"{image.stem}-{number}.png"
+            copy.write_bytes(image.read_bytes() + os.urandom(8))
+            copies.append(copy)
+    return copies
+
+
+if __name__ == "__main__":
+    main()
