@@ -25,7 +25,7 @@ GRID_POINTS = ("Grid points x", "Grid points y")
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session, fields = page.session, SettingFields(page.session)
-    with ui.element("div").classes("side-by-side"):
+    with ui.element("div").classes("side-by-side right-wider"):
         fields.line("camera_name", "Camera name", "camera-name", "camera")
         fields.option("board_kind", "Board", {name: name for name in sorted(installed().boards)})
     with ui.element("div").classes("side-by-side") as grid:
