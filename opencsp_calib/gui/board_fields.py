@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from opencsp_calib.errors import InputError
+from opencsp_calib.gui.controls import set_prop
 from opencsp_calib.gui.setting_fields import SettingFields
 from opencsp_calib.gui.settings import BY_FIELDS, Settings
 from opencsp_calib.models import LENS_MODELS
@@ -53,7 +54,8 @@ def build(page: "Page") -> Callable[[], None]:
         for element, kinds in ((grid, BY_FIELDS), (square, BY_FIELDS), (markers, ("charuco",))):
             element.set_visibility(now.board_kind in kinds)
         described.set_visibility(now.board_kind not in BY_FIELDS)
-        across.props["label"], down.props["label"] = COUNTED.get(now.board_kind, GRID_POINTS)
+        for count, label in zip((across, down), COUNTED.get(now.board_kind, GRID_POINTS), strict=True):
+            set_prop(count, "label", label)
         said.set_text(_said(now))
         said.set_visibility(bool(said.text))
         for made in solved_by:

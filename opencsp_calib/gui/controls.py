@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-__all__ = ["action", "choice", "field", "quiet_action"]
+__all__ = ["action", "choice", "field", "quiet_action", "set_prop"]
 
 
 def action(label: str, on_click: Callable[[], Any], testid: str = "") -> ui.button:
@@ -35,3 +35,9 @@ def choice(label: str, options: Mapping[str, str], value: str, on_change: Callab
     known = dict(options) if value in options else {**options, value: value}
     made = ui.select(known, label=label, value=value, on_change=lambda event: on_change(event.value))
     return made.props("outlined dense options-dense").classes("field")
+
+
+def set_prop(element: ui.element, name: str, value: Any) -> None:
+    """Set a property, if it is new: setting one sends all, a field's value too, older than what is being typed."""
+    if element.props.get(name) != value:
+        element.props[name] = value

@@ -13,7 +13,7 @@ from opencsp_calib.board import Board
 from opencsp_calib.drawing import Drawing, write_board
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui.asking import may_write
-from opencsp_calib.gui.controls import action, choice, field
+from opencsp_calib.gui.controls import action, choice, field, set_prop
 from opencsp_calib.gui.files import shown, within
 from opencsp_calib.gui.session import Session
 from opencsp_calib.registry import installed
@@ -55,7 +55,7 @@ def build(page: "Page") -> Callable[[], None]:
 
     def refresh() -> None:
         text = spec.value.strip()
-        place.props["placeholder"] = f"board{suffix.value}"
+        set_prop(place, "placeholder", f"board{suffix.value}")
         if text == drawn[0]:
             return
         drawn[0] = text

@@ -13,7 +13,7 @@ from opencsp_calib.atomic import check_writable
 from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
-from opencsp_calib.gui.controls import action, choice, field
+from opencsp_calib.gui.controls import action, choice, field, set_prop
 from opencsp_calib.gui.files import file_name, shown, within
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.session import Session
@@ -62,7 +62,7 @@ def build(page: "Page") -> Callable[[], None]:
     button = action("Save Camera", save, "save-camera")
 
     def refresh() -> None:
-        place.props["placeholder"] = file_name(session.settings.camera_name, "camera") + suffix()
+        set_prop(place, "placeholder", file_name(session.settings.camera_name, "camera") + suffix())
         button.set_enabled(session.calibration is not None and not session.busy)
 
     return refresh

@@ -6,6 +6,7 @@ import sys
 import threading
 import webbrowser
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import nicegui
@@ -55,7 +56,8 @@ def serve(folder: Path, host: str, port: int, *, open_browser: bool) -> None:
     server = uvicorn.Server(uvicorn.Config(guarded, log_level="error", access_log=False, ws_max_size=2**24))
     sys.stdout.write(address + "\n")
     sys.stdout.flush()
-    server.run(sockets=[listening])
+    with suppress(KeyboardInterrupt):  # the usual end
+        server.run(sockets=[listening])
 
 
 def _application(session: Session, started: Callable[[], None]) -> FastAPI:

@@ -18,6 +18,7 @@ class SettingFields:
     def __init__(self, session: Session) -> None:
         self.session = session
         self._made: list[tuple[str, ValueElement[Any]]] = []
+        ui.context.client.on_connect(self._hear)
 
     def line(self, setting: str, label: str, testid: str = "", hint: str = "") -> ui.input:
         """A line to type into."""
@@ -50,6 +51,16 @@ class SettingFields:
         for setting, made in self._made:
             if made.value != self._value(setting):
                 made.set_value(self._value(setting))
+
+    async def _hear(self) -> None:
+        """Take what was typed before the page was connected: its events come late, and out of order."""
+        typed = {setting: made for setting, made in self._made if isinstance(made, ui.input)}
+        fields = ", ".join(f"{setting}: getElement({made.id})?.inputValue" for setting, made in typed.items())
+        pause = "await new Promise((done) => setTimeout(done, 200));"
+        values = await ui.context.client.run_javascript(f"{pause} return {{{fields}}};", timeout=60)
+        for setting, made in typed.items():
+            if isinstance(values.get(setting), str) and values[setting] != made.value:
+                made.set_value(values[setting])
 
     def _value(self, setting: str) -> Any:
         return getattr(self.session.settings, setting)
