@@ -39,6 +39,7 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W -q -b html docs docs/_build
 
 bench: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group studies
 	$(BIN)/python validation/bench.py
 
 pictures: $(VENV)/.dev

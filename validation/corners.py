@@ -13,7 +13,7 @@ Way
     window; ours also solves for the light's gradients, which costs 3 %. cornerSubPix swallows neighbours where its
     window is larger than the squares.
 
-Run ``python validation/bench.py corners``. It needs calib-targets: ``pip install calib-targets==0.15.5``.
+Run ``python validation/bench.py corners``. It needs calib-targets: ``pip install --group studies``.
 """
 
 from collections.abc import Callable, Iterator

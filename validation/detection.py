@@ -11,7 +11,7 @@ Way
     (calib-targets uses its own, which are counted). "OpenCV's classic" is `findChessboardCorners` as OpenCSP calls it,
     without `cornerSubPix`.
 
-Run ``python validation/bench.py detection``. It needs calib-targets: ``pip install calib-targets==0.15.5``.
+Run ``python validation/bench.py detection``. It needs calib-targets: ``pip install --group studies``.
 """
 
 import sys

@@ -11,7 +11,7 @@ Way
     exhaustive) do not say which of the board's corners theirs are. OpenCV's ChArUco: `CharucoDetector` with its
     defaults. Times are of the processor, with one thread.
 
-Run ``python validation/bench.py detection_parts``. It needs calib-targets: ``pip install calib-targets==0.15.5``.
+Run ``python validation/bench.py detection_parts``. It needs calib-targets: ``pip install --group studies``.
 """
 
 import sys
