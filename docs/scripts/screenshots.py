@@ -8,8 +8,10 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 
+from PIL import Image
 from selenium import webdriver
 
 HERE = Path(__file__).resolve().parent
@@ -33,11 +35,17 @@ def chromium(width: int, height: int) -> Iterator[webdriver.Chrome]:
         browser.quit()
 
 
+def save(browser: webdriver.Chrome, name: str) -> None:
+    """What it shows, as a small PNG."""
+    shown = Image.open(BytesIO(browser.get_screenshot_as_png())).convert("RGB")
+    shown.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
+
+
 def report(demo: Path) -> None:
     """The top of the report."""
     with chromium(1100, 1180) as browser:
         browser.get((demo / "report.html").as_uri())
-        browser.save_screenshot(str(IMAGES / "demo.png"))
+        save(browser, "demo")
 
 
 def window(photographs: list[Path], folder: Path) -> None:
@@ -51,9 +59,9 @@ def window(photographs: list[Path], folder: Path) -> None:
         page.describe("demo", 21, 18, 50)
         page.select(photographs)
         page.find_corners()
-        browser.save_screenshot(str(IMAGES / "gui_found.png"))
+        save(browser, "gui_found")
         page.calibrate()
-        browser.save_screenshot(str(IMAGES / "gui_calibrated.png"))
+        save(browser, "gui_calibrated")
 
 
 def main() -> None:
