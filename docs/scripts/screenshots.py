@@ -6,13 +6,13 @@ Run ``python docs/scripts/screenshots.py [VIEWS]``; needs Debian's chromium and 
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
 
-from PIL import Image
 from selenium import webdriver
+from selenium.webdriver.support.ui import WebDriverWait
 
 HERE = Path(__file__).resolve().parent
 IMAGES = HERE.parent / "images"
@@ -36,9 +36,10 @@ def chromium(width: int, height: int) -> Iterator[webdriver.Chrome]:
 
 
 def save(browser: webdriver.Chrome, name: str) -> None:
-    """What it shows, as a small PNG."""
-    shown = Image.open(BytesIO(browser.get_screenshot_as_png())).convert("RGB")
-    shown.quantize(128).save(IMAGES / f"{name}.png", optimize=True)
+    """What it shows, once nothing is being drawn any more."""
+    WebDriverWait(browser, 120).until(lambda _: "Drawing …" not in browser.page_source)
+    time.sleep(1.0)  # what is drawn still fades in
+    browser.save_screenshot(str(IMAGES / f"{name}.png"))
 
 
 def report(demo: Path) -> None:
