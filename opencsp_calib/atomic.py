@@ -35,17 +35,17 @@ def check_writable(path: str | os.PathLike[str]) -> Path:
 
 
 def _writable(path: Path) -> Path:
+    mode = path.stat().st_mode if path.exists() else None  # of what a link leads to
+    if mode is not None and stat.S_ISDIR(mode):
+        raise InputError(f"cannot write {path}: it is a folder; add a file name")
+    if mode is not None and not stat.S_ISREG(mode):
+        raise InputError(f"cannot write {path}: it is no regular file, but a device or a pipe")
     target = path.resolve() if path.is_symlink() else path
     if target.is_symlink():
         raise InputError(f"cannot write {path}: it is a link that leads back to itself")
     folder = target.parent
     if not folder.is_dir():
         raise InputError(f"cannot write {path}: the folder {folder} does not exist; create it first")
-    mode = target.stat().st_mode if target.exists() else None
-    if mode is not None and stat.S_ISDIR(mode):
-        raise InputError(f"cannot write {path}: it is a folder; add a file name")
-    if mode is not None and not stat.S_ISREG(mode):
-        raise InputError(f"cannot write {path}: it is no regular file, but a device or a pipe")
     if not os.access(folder, os.W_OK) or (mode is not None and not os.access(target, os.W_OK)):
         raise InputError(f"cannot write {path}: no permission")
     if mode is None and len(os.fsencode(target.name)) > MAX_NAME:

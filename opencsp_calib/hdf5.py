@@ -123,7 +123,7 @@ def write_camera(camera: Camera, file: "h5py.File") -> None:
     else:
         group["distortion_coef"] = camera.distortion if camera.distortion.size else np.zeros(4)
     group["image_shape_xy"] = np.array(camera.image_size, dtype=np.int32)
-    group["name"] = camera.name
+    group["name"] = camera.name.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode()
     group.attrs["format_version"] = FORMAT_VERSION
     # of fixed length: the HDF5 library may hang or crash over a damaged attribute of variable length
     group.attrs["model"] = np.bytes_(camera.model)
@@ -136,9 +136,9 @@ def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
     import h5py
 
     path = Path(path)
-    if not path.is_file():
-        raise InputError(f"no such file: {path}")
     try:
+        if not path.is_file():
+            raise InputError(f"no such file: {path}")
         check_seal(path)
         with h5py.File(path, "r") as file:
             yield file

@@ -36,6 +36,7 @@ __all__ = [
     "find_images",
     "images_in",
     "natural_order",
+    "printable",
     "read_encoded",
     "read_image",
     "reduced",
@@ -45,6 +46,7 @@ __all__ = [
 
 EXTENSIONS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".pnm", ".ppm", ".webp")
 MAX_BYTES = 2**31
+MAX_NAME = 255  # characters
 
 
 @dataclass(frozen=True)
@@ -99,14 +101,21 @@ def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
     counts: dict[str, int] = {}
     files = []
     for path in paths:
-        name = path.absolute().relative_to(root).as_posix() if root else str(path)
+        name = printable(path.absolute().relative_to(root).as_posix() if root else str(path))
         counts[name] = counts.get(name, 0) + 1
         files.append(ImageFile(name if counts[name] == 1 else f"{name} ({counts[name]})", path))
     return tuple(files)
 
 
+def printable(name: str) -> str:
+    """A name with what is no printable character escaped: line ends, bytes that are no text in any alphabet."""
+    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in name)
+
+
 def _expanded(text: str) -> list[Path]:
     path = Path(text)
+    if len(path.name) > MAX_NAME:
+        raise InputError(f"no such file or folder: {text[:60]}... (the name is too long for a file)")
     if path.is_dir():
         found = images_in(path)
         if not found:

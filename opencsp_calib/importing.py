@@ -9,6 +9,7 @@
     camera = fitted(imported, "opencv8").camera              # or approximates, within 0.1 px or what was accepted
 """
 
+import stat
 import warnings
 from collections.abc import Callable, Mapping
 from os import PathLike
@@ -98,11 +99,15 @@ def recognise(path: str | PathLike[str], formats: Mapping[str, CameraFormat], na
         If the format cannot be read here.
     """
     path = Path(path)
-    if not path.exists():
-        raise InputError(f"{path} does not exist")
-    if path.is_dir():
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist") from None
+    except (OSError, ValueError) as error:  # a name too long, a circle of links, a null in the name
+        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if stat.S_ISDIR(mode):
         raise InputError(f"{path} is a folder; name the camera file in it")
-    if not path.is_file():
+    if not stat.S_ISREG(mode):
         raise InputError(f"{path} is not a regular file")
     readable = {key: format_ for key, format_ in formats.items() if format_.reads}
     if name is not None and name not in readable:

@@ -62,6 +62,9 @@ def run(arguments: list[str]) -> int:
     except BrokenPipeError:  # the reader of our output has gone, as `| head` does: nobody is left to tell
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    except OSError as error:  # what nobody foresaw: standard output on a full disk, a drive that has gone
+        complain(f"{error.filename}: {error.strerror}" if error.filename else f"the system says: {error.strerror}")
+        return 2
     except MemoryError:
         complain("there is not enough memory for this; use fewer --jobs, or smaller images")
         return 2

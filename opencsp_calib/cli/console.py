@@ -1,11 +1,14 @@
 """Where the command line's words go: people read standard error, programs read standard output."""
 
+import contextlib
 import json
 import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
+
+from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -31,8 +34,9 @@ NUMBER = re.compile(r"[-+±]?[\d.]|nan|inf|-?$")  # how a cell of a column of nu
 
 
 def say(text: str) -> None:
-    """A line for people."""
-    _console().print(text)
+    """A line for people; nobody is told where standard error is closed, or on a full disk."""
+    with contextlib.suppress(OSError):
+        _console().print(text)
 
 
 def complain(text: str) -> None:
@@ -63,11 +67,14 @@ def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
         table.add_column(title, justify="right" if numbers else "left", no_wrap=index == 0, overflow="fold")
     for row in rows:
         table.add_row(*row)
-    console.print(table, soft_wrap=False)
+    with contextlib.suppress(OSError):
+        console.print(table, soft_wrap=False)
 
 
 def print_json(content: Any) -> None:
     """One JSON object on standard output."""
+    if sys.stdout is None:
+        raise InputError("--json writes to standard output, which is closed")
     sys.stdout.write(json.dumps(content, indent=1, allow_nan=False) + "\n")
     sys.stdout.flush()
 

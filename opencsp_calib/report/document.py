@@ -34,4 +34,4 @@ def write_document(title: str, sections: Iterable[str], path: str | os.PathLike[
         + "\n</body></html>\n"
     )
     with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8")
+        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")

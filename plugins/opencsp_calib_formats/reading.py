@@ -60,7 +60,7 @@ class TextFormat(FileFormat):
         """See `KeepsNotes.write_with_notes`."""
         text = self.text(cameras, path, notes)
         with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
 
 
 def comments(notes: Mapping[str, str]) -> list[str]:
