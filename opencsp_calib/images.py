@@ -36,7 +36,6 @@ __all__ = [
     "find_images",
     "images_in",
     "natural_order",
-    "printable",
     "read_encoded",
     "read_image",
     "reduced",
@@ -101,15 +100,10 @@ def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
     counts: dict[str, int] = {}
     files = []
     for path in paths:
-        name = printable(path.absolute().relative_to(root).as_posix() if root else str(path))
+        name = path.absolute().relative_to(root).as_posix() if root else str(path)
         counts[name] = counts.get(name, 0) + 1
         files.append(ImageFile(name if counts[name] == 1 else f"{name} ({counts[name]})", path))
     return tuple(files)
-
-
-def printable(name: str) -> str:
-    """A name with what is no printable character escaped: line ends, bytes that are no text in any alphabet."""
-    return "".join(c if c.isprintable() else c.encode("unicode_escape").decode("ascii") for c in name)
 
 
 def _expanded(text: str) -> list[Path]:
