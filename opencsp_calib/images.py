@@ -31,6 +31,7 @@ __all__ = [
     "MAX_BYTES",
     "EncodedImage",
     "ImageFile",
+    "as_text",
     "decode_image",
     "encode_thumbnail",
     "find_images",
@@ -100,10 +101,15 @@ def find_images(inputs: str | os.PathLike[str] | Iterable[str | os.PathLike[str]
     counts: dict[str, int] = {}
     files = []
     for path in paths:
-        name = path.absolute().relative_to(root).as_posix() if root else str(path)
+        name = as_text(path.absolute().relative_to(root).as_posix() if root else str(path))
         counts[name] = counts.get(name, 0) + 1
         files.append(ImageFile(name if counts[name] == 1 else f"{name} ({counts[name]})", path))
     return tuple(files)
+
+
+def as_text(name: str) -> str:
+    """A file's name with bytes escaped that are no text in any alphabet, so that it can be written and drawn."""
+    return name.encode("utf-8", "backslashreplace").decode()
 
 
 def _expanded(text: str) -> list[Path]:

@@ -1,7 +1,10 @@
 """The commands that take any program's camera file: convert, show, compare, formats."""
 
 import json
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import cv2
@@ -157,3 +160,49 @@ def test_a_camera_file_converted_keeps_its_name_numbers_and_record(tmp_path: Pat
     assert again.name == "other"
     assert (again.params == camera.params).all()
     assert load_record(tmp_path / "b.h5") == {"aperture": "f/8"}
+
+
+LONG = "x" * 300
+SAID = [
+    (["show", LONG], "cannot be read: File name too long|does not exist"),
+    (["convert", "{file}", LONG + ".h5"], "cannot write x+\\.\\.\\."),
+    (["calibrate", LONG, "--board", "checkerboard:5x6:50mm"], "too long for a file"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), SAID)
+def test_names_that_no_file_can_have(words: list[str], said: str, stereo: Path, capsys) -> None:
+    command(*(word.format(file=stereo) for word in words), *(["--camera", "right"] * ("convert" in words)), code=2)
+    assert re.search(said, " ".join(capsys.readouterr().err.split()))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX devices, pipes and links")
+def test_devices_pipes_and_circles_of_links_are_no_outputs(stereo: Path, tmp_path: Path, capsys) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "circle").symlink_to("circle")
+    for out in ("/dev/null", tmp_path / "pipe", tmp_path / "circle"):
+        command("convert", stereo, out, "--camera", "right", "--to", "ros", code=2)
+        assert "cannot write" in capsys.readouterr().err
+        command("show", tmp_path / "circle", code=2)
+    assert not Path("/dev/null").is_file()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links need a privilege")
+def test_a_link_stays_and_what_it_leads_to_is_written(stereo: Path, tmp_path: Path) -> None:
+    (tmp_path / "link.h5").symlink_to("real.h5")
+    command("convert", stereo, tmp_path / "link.h5", "--camera", "right")
+    assert (tmp_path / "link.h5").is_symlink()
+    assert Camera.load(tmp_path / "real.h5").name == "right"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+@pytest.mark.parametrize("closed", [">/dev/full", ">&-", "2>/dev/full", "2>&-", "<&-", "env"])
+def test_outputs_that_are_closed_or_full_and_an_empty_environment(closed: str, tmp_path: Path) -> None:
+    save = Camera("cam", "pinhole", np.array([900.0, 901, 500, 400]), (1000, 800)).save
+    save(tmp_path / "c.h5")
+    bare = "env -i" if closed == "env" else ""
+    where = "" if closed == "env" else closed
+    line = f"{bare} {sys.executable} -m opencsp_calib show {tmp_path / 'c.h5'} --json {where}"
+    done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
+    assert "Traceback" not in done.stderr
+    assert done.returncode == (2 if closed.startswith(">") else 0)

@@ -31,6 +31,7 @@ from opencsp_calib.errors import CalibError, FileFormatError
 from opencsp_calib.hdf5 import load_record, read_camera, save_camera
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_calibration, save_observations
 from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.seal import LENGTH
 
 PARAMS = [2710.1, 2704.3, 854.2, 628.1]
 
@@ -288,3 +289,36 @@ def test_a_folder_that_is_not_there_says_so(tmp_path: Path) -> None:
         camera_of("opencv4").save(tmp_path / "no" / "c.h5")
     with pytest.raises(InputError, match="it is a folder"):
         camera_of("opencv4").save(tmp_path)
+
+
+def test_a_sealed_file_is_plain_hdf5_and_loses_its_seal_when_another_program_changes_it(tmp_path: Path) -> None:
+    path = tmp_path / "c.h5"
+    camera = camera_of("opencv4")
+    camera.save(path)
+    assert b"sealed" in path.read_bytes()[-LENGTH:]
+    with h5py.File(path, "a") as file:
+        file["theirs"] = np.zeros(3)
+    assert b"sealed" not in path.read_bytes()
+    assert Camera.load(path) == camera
+
+
+@pytest.mark.parametrize("cut", [1, 30, 64, LENGTH - 5])
+def test_a_seal_that_is_cut_is_damage(cut: int, tmp_path: Path) -> None:
+    path = tmp_path / "c.h5"
+    camera_of("opencv4").save(path)
+    path.write_bytes(path.read_bytes()[:-cut])
+    if cut < LENGTH - 20:
+        with pytest.raises(FileFormatError, match="damaged"):
+            Camera.load(path)
+    else:
+        assert Camera.load(path) == camera_of("opencv4")  # nothing but the seal is lost
+
+
+def test_every_single_byte_matters(tmp_path: Path) -> None:
+    path = tmp_path / "o.h5"
+    save_observations(observations(BOARDS[0]), path)
+    content = path.read_bytes()
+    for place in range(0, len(content), 23):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :])
+        with pytest.raises(FileFormatError, match="damaged"):
+            load_observations(path)

@@ -122,3 +122,13 @@ def test_a_preview_in_a_tiff_is_no_page(tmp_path: Path) -> None:
     struct.pack_into("<HHII", data, second + 2, 254, 4, 1, 1)  # its first entry says: a reduced image
     path.write_bytes(data)
     assert (read(path) == 7).all()
+
+
+def test_a_name_that_is_no_text_is_escaped(tmp_path: Path) -> None:
+    try:
+        (tmp_path / "a\udcff\n.png").write_bytes(b"x")
+    except (OSError, UnicodeError):
+        pytest.skip("this system has no such names")
+    (found,) = find_images(tmp_path)
+    assert found.name == "a\\udcff\n.png"
+    assert found.path.read_bytes() == b"x"

@@ -57,7 +57,7 @@ def calibrate(
 ) -> None:
     """Calibrate a camera from photographs of a board."""
     from opencsp_calib import dropping, pipeline
-    from opencsp_calib.images import find_images
+    from opencsp_calib.images import as_text, find_images
     from opencsp_calib.options import aspect_from
 
     _check_targets(output, report)
@@ -80,7 +80,7 @@ def calibrate(
     record = _record(note or [], pixel_pitch)
     options |= args.given(guess=args.guess_from(guess))
     options |= {
-        "name": name or files[0].path.absolute().parent.name,
+        "name": name or as_text(files[0].path.absolute().parent.name),
         "record": record,
         "provenance": pipeline.places_of(images),
     }
