@@ -26,18 +26,20 @@ class LiveCamera:
         self.frame: dict[str, Any] | None = None
         self.message = Message("Describe the board under Calibrate, then start.")
         self._process: asyncio.subprocess.Process | None = None
+        self._begun = False  # from the click on, before there is a process: a second click must not start another
         self._reading: asyncio.Task[None] | None = None
 
     @property
     def running(self) -> bool:
         """Whether a capture goes on."""
-        return self._process is not None
+        return self._begun
 
     async def start(self, **asked: Any) -> None:
         """Begin a capture; the arguments are those of `opencsp_calib.capture.prepared`, settings as a list of texts."""
         if self.running:
             return
-        self.frame, self.message = None, Message("Starting the camera …")
+        self._begun, self.frame, self.message = True, None, Message("Starting the camera …")
+        self.changed.emit()
         self._process = await asyncio.create_subprocess_exec(
             sys.executable,
             "-m",
@@ -80,5 +82,5 @@ class LiveCamera:
                 ended = Message(answer["error"], "bad")
             self.changed.emit()
         await process.wait()
-        self._process, self.message = None, ended
+        self._begun, self._process, self.message = False, None, ended
         self.changed.emit()

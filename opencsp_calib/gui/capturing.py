@@ -154,6 +154,8 @@ def _picture(camera: LiveCamera) -> Callable[[], None]:
         advice.set_text(frame["advice"])
         picture.set_source(f"data:image/jpeg;base64,{frame['picture']}")
         picture.set_content(_drawn(frame))
+        width, height = frame["size"]
+        picture.style(f"--aspect: {width / height:.4f}")
 
     return refresh
 
