@@ -16,7 +16,7 @@ def convex_hull(pixels: Pixels) -> Pixels:
     From left to right below and back above, keeping left turns only (Andrew, "Another efficient algorithm for convex
     hulls in two dimensions", 1979).
     """
-    ordered = [(float(x), float(y)) for x, y in np.unique(pixels, axis=0)]
+    ordered = [(float(x), float(y)) for x, y in np.unique(_outer(pixels), axis=0)]
     hull: list[tuple[float, float]] = []
     for way in (ordered, ordered[::-1]):
         first = len(hull)
@@ -26,6 +26,18 @@ def convex_hull(pixels: Pixels) -> Pixels:
             hull.append((x, y))
         del hull[-1:]  # it begins the way back
     return np.array(hull, dtype=np.float64).reshape(-1, 2)
+
+
+def _outer(pixels: Pixels) -> Pixels:
+    """Without those within the octagon of the outermost in eight directions: most, seen at once (Akl and Toussaint)."""
+    if len(pixels) < 16:
+        return pixels
+    angles = np.arange(8) * (np.pi / 4)
+    farthest = (pixels @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0)
+    octagon = pixels[farthest[farthest != np.roll(farthest, -1)]]
+    edges: Floats = np.roll(octagon, -1, axis=0) - octagon
+    left = edges[:, 0] * (pixels[:, None, 1] - octagon[:, 1]) - edges[:, 1] * (pixels[:, None, 0] - octagon[:, 0])
+    return pixels[~(left > 0).all(axis=1)] if len(octagon) >= 3 else pixels
 
 
 def hull_area(hull: Pixels) -> float:
