@@ -375,3 +375,15 @@ def test_nothing_is_written_when_it_fails(photographs: Path, tmp_path: Path, cap
     complaint(capsys, "calibrate", photographs, "--board", "checkerboard:5x4:30mm", "-o", out)
     assert out.read_text() == "precious"
     assert [path.name for path in tmp_path.iterdir()] == ["c.h5"]
+
+
+def test_an_interruption_that_a_library_turned_into_an_error_is_one_line(monkeypatch, capsys) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise TypeError("Cannot compare structured arrays")
+
+    monkeypatch.setattr("opencsp_calib.cli.app", interrupted)
+    with pytest.raises(TypeError):
+        run(["formats"])
+    monkeypatch.setattr("opencsp_calib.cli.stopping._told", [15])
+    assert run(["formats"]) == 1
+    assert capsys.readouterr().err.startswith("error: stopped")

@@ -13,7 +13,7 @@ import typer
 from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, fleets, setting_up, window
 from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.setting_up import print_versions
-from opencsp_calib.cli.stopping import stop_when_told
+from opencsp_calib.cli.stopping import stop_when_told, was_told
 from opencsp_calib.errors import CalibError
 
 __all__ = ["app", "main"]
@@ -69,10 +69,13 @@ def run(arguments: list[str]) -> int:
         complain("there is not enough memory for this; use fewer --jobs, or smaller images")
         return 2
     except Exception as error:
-        if not hasattr(error, "format_message"):  # not the argument parser's: a defect of ours, shown whole
+        if was_told():  # NumPy, for one, turns an interruption into a TypeError
+            outcome = INTERRUPTED
+        elif hasattr(error, "format_message"):  # the argument parser's
+            complain(error.format_message())
+            return 2
+        else:  # a defect of ours, shown whole
             raise
-        complain(error.format_message())
-        return 2
     if outcome == INTERRUPTED:
         complain("stopped; what was not finished was not written")
         return 1

@@ -3,19 +3,28 @@
 import signal
 from types import FrameType
 
-__all__ = ["stop_when_told"]
+__all__ = ["stop_when_told", "was_told"]
 
-SIGNALS = ("SIGTERM", "SIGHUP", "SIGBREAK")  # a service manager, a closed terminal, Windows
+SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")  # Ctrl-C, a service manager, a closed terminal, Windows
 
 
 def stop_when_told() -> None:
-    """Have each of the signals end the program as Ctrl-C does; one that is ignored, as under nohup, stays so."""
+    """Have each of the signals end the program by KeyboardInterrupt; one that is ignored, as under nohup, stays so."""
     for name in SIGNALS:
         number = getattr(signal, name, None)
         if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
             signal.signal(number, _interrupt)
 
 
+def was_told() -> bool:
+    """Whether one of the signals came: what is raised then may be a library's version of KeyboardInterrupt."""
+    return bool(_told)
+
+
+_told: list[int] = []
+
+
 def _interrupt(number: int, _: FrameType | None) -> None:
+    _told.append(number)
     signal.signal(number, signal.SIG_DFL)  # who asks twice does not want to wait
     raise KeyboardInterrupt
