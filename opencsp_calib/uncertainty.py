@@ -42,6 +42,7 @@ __all__ = [
 
 UNKNOWN = {"undetermined", "uncertainty-unknown"}
 ROUNDING = 1e-9  # px (or sigmas, where corners are weighted): what is left of exact corners tells nothing
+NOTICEABLE_PX = 0.01  # no corner is located better: a camera that moves by less has not moved for anybody
 MIN_VIEWS = 3  # with two views, leaving one out leaves nothing to compare
 
 
@@ -182,7 +183,7 @@ def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...], jacob
     """
     most = max(influences, key=lambda i: i.share)
     explained = np.einsum("nij,jk,nik->n", jacobian, calibration.covariance_residual, jacobian).mean()
-    if not (most.share > 0.5 and most.shift_rms_px**2 > explained):
+    if not (most.share > 0.5 and most.shift_rms_px**2 > explained and most.shift_rms_px > NOTICEABLE_PX):
         return ()
     message = (
         f"this result hangs on {most.image}: left out, it moves what the camera sees by {most.shift_rms_px:.2g} px rms "
