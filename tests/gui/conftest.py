@@ -65,3 +65,10 @@ def window(chromium: Any, server: Server) -> Window:
     opened = Window(chromium, server)
     opened.open()
     return opened
+
+
+@pytest.fixture(autouse=True)
+def rest(chromium: Any) -> Iterator[None]:
+    """No page is left open: one whose server is gone would go on trying, at the cost of the tests that follow."""
+    yield
+    chromium.get("about:blank")
