@@ -1,8 +1,11 @@
-"""Thousands of faults, and what was lost or wrong after each: nothing, or the run ends with 1.
+"""Thousands of faults, and what was lost or wrong after each.
 
-Run ``python validation/faults.py [CASES] [> validation/results/faults.md]``. Beside those of ``tests/faults.py`` with
-CASES damaged files of each kind (default 500): the commands themselves, stopped by SIGTERM and SIGKILL at random
-moments, and writing to a disk (a tmpfs, where that may be mounted) that is full.
+Claim: after damaged files, failing disks, odd names, writers at the same time and commands stopped at any moment, no
+result is lost and none is wrong; otherwise the run ends with 1.
+
+Way: the faults of ``tests/faults.py``, with 500 damaged files of each kind (or as many as the argument says); the
+commands themselves, stopped by SIGTERM and SIGKILL at random moments; and writing to a disk (a tmpfs, where that may be
+mounted) that is full.
 """
 
 import os

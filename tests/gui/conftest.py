@@ -72,3 +72,4 @@ def rest(chromium: Any) -> Iterator[None]:
     """No page is left open: one whose server is gone would go on trying, at the cost of the tests that follow."""
     yield
     chromium.get("about:blank")
+    chromium.get_log("browser")  # the next test has a log of its own
