@@ -12,6 +12,7 @@ as an argument. Memory is the peak resident set of the whole process.
 """
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -62,11 +63,20 @@ class Run:
         """Run it."""
         started = time.perf_counter()
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        _, status, usage = os.wait4(process.pid, 0)
+        peak_mb, ended = 0.0, 0
+        while not ended:
+            peak_mb = max(peak_mb, _peak_mb(process.pid))
+            time.sleep(0.01)
+            ended, status, usage = os.wait4(process.pid, os.WNOHANG)
         if status:
             raise RuntimeError(f"failed: {command}")
-        wall_s = time.perf_counter() - started
-        return cls(wall_s, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+        return cls(time.perf_counter() - started, usage.ru_utime + usage.ru_stime, peak_mb)
+
+
+def _peak_mb(pid: int) -> float:
+    """Of a running process. Its `ru_maxrss` is no use: it has that of the process that started it."""
+    found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(encoding="ascii"))
+    return int(found[1]) / 1024 if found else 0.0
 
 
 def photographs(folder: Path, count: int, camera: Camera) -> None:
