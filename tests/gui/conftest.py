@@ -65,11 +65,3 @@ def window(chromium: Any, server: Server) -> Window:
     opened = Window(chromium, server)
     opened.open()
     return opened
-
-
-@pytest.fixture(autouse=True)
-def rest(chromium: Any) -> Iterator[None]:
-    """No page is left open: one whose server is gone would go on trying, at the cost of the tests that follow."""
-    yield
-    chromium.get("about:blank")
-    chromium.get_log("browser")  # the next test has a log of its own
