@@ -1,6 +1,8 @@
 """What all tests share: where the real data is."""
 
 import os
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -42,3 +44,15 @@ def photographs(small_world: "SmallWorld", tmp_path_factory: pytest.TempPathFact
     folder = tmp_path_factory.mktemp("photographs")
     small_world.photograph(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def emulated_cameras() -> Iterator[None]:
+    """Basler's emulated cameras for this process alone.
+
+    Every process emulates the same serial numbers, and a lock in the folder for temporary files says who has one.
+    """
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TMPDIR", folder)  # for the processes that a test starts
+        patch.setattr(tempfile, "tempdir", folder)
+        yield

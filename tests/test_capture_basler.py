@@ -14,16 +14,22 @@ from opencsp_calib.comparison import compare
 from opencsp_calib.images import find_images, read_image
 
 pytest.importorskip("pypylon", reason="Basler's SDK is not installed")
+pytestmark = pytest.mark.usefixtures("emulated_cameras")
 
 SPEC = "checkerboard:18x23:50mm"
 COMMAND = [sys.executable, "-m", "opencsp_calib", "capture"]
-EMULATED = {**os.environ, "PYLON_CAMEMU": "2"}
 
 
-def captured(folder: Path, *more: object, environment=EMULATED, **options) -> subprocess.CompletedProcess:
+def emulated(cameras: int) -> dict[str, str]:
+    return {**os.environ, "PYLON_CAMEMU": str(cameras)}
+
+
+def captured(folder: Path, *more: object, cameras: int = 2, **options) -> subprocess.CompletedProcess:
     """The command, in a process of its own, since the SDK reads its environment once."""
     command = [*COMMAND, str(folder), "--board", SPEC, *map(str, more)]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, stdin=subprocess.DEVNULL, **options)
+    return subprocess.run(
+        command, env=emulated(cameras), capture_output=True, text=True, stdin=subprocess.DEVNULL, **options
+    )
 
 
 def test_sandias_photographs_through_the_camera_to_a_camera_file(data_dir: Path, tmp_path: Path) -> None:
@@ -58,7 +64,7 @@ def test_sandias_photographs_through_the_camera_to_a_camera_file(data_dir: Path,
 
 
 def test_no_camera_is_one_sentence(tmp_path: Path) -> None:
-    done = captured(tmp_path / "set", environment={**os.environ, "PYLON_CAMEMU": "0"})
+    done = captured(tmp_path / "set", cameras=0)
     assert done.returncode == 2
     assert done.stderr.startswith("error: there is no Basler camera ''; no Basler camera is connected: check cable")
     assert len(done.stderr.splitlines()) == 1
@@ -67,7 +73,7 @@ def test_no_camera_is_one_sentence(tmp_path: Path) -> None:
 def test_a_camera_in_use_frames_that_fail_and_no_trigger_are_one_sentence_each(tmp_path: Path) -> None:
     small = ["--device", "0815-0000", "--set", "Width=64", "--set", "Height=48", "--release", "interval:0"]
     holder = [*COMMAND, str(tmp_path / "one"), "--board", SPEC, *small, "--count", "100000"]
-    with subprocess.Popen(holder, env=EMULATED, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as held:
+    with subprocess.Popen(holder, env=emulated(2), stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as held:
         for line in held.stderr:
             if line.startswith("0001.png"):
                 break

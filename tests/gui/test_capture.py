@@ -13,16 +13,15 @@ from opencsp_calib.images import write_image
 from opencsp_calib.rendering import render
 
 pytest.importorskip("pypylon", reason="Basler's SDK is not installed")
-pytestmark = pytest.mark.timeout(600)
+pytestmark = [pytest.mark.timeout(600), pytest.mark.usefixtures("emulated_cameras")]
 
 COPIES = 6  # frames for which a board is held still
 
 
-@pytest.fixture
-def scene(tmp_path: Path) -> Path:
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Photographs of a board that is held still in twelve places, one after the other."""
-    world, folder = SmallWorld.seeded(), tmp_path / "scene"
-    folder.mkdir()
+    world, folder = SmallWorld.seeded(), tmp_path_factory.mktemp("scene")
     for place, pose in enumerate(world.poses):
         for copy in range(COPIES):
             image = render(world.camera, world.board, pose, rng=place * COPIES + copy, samples=2)
@@ -31,7 +30,7 @@ def scene(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def window(chromium, scene: Path, tmp_path: Path, monkeypatch) -> Iterator[Window]:
+def window(chromium, tmp_path: Path, monkeypatch) -> Iterator[Window]:
     monkeypatch.setitem(os.environ, "PYLON_CAMEMU", "1")
     (tmp_path / "work").mkdir()
     with Server(tmp_path / "work") as running:

@@ -22,6 +22,8 @@ from opencsp_calib import InputError  # noqa: E402
 from opencsp_calib.conformance import parametrize_checks  # noqa: E402
 from opencsp_calib.images import write_image  # noqa: E402
 
+pytestmark = pytest.mark.usefixtures("emulated_cameras")
+
 SOURCE = BaslerSource()
 FIRST, SECOND = "0815-0000", "0815-0001"
 SMALL = {"Width": 64, "Height": 48}
