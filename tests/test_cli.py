@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import stat
 import subprocess
@@ -236,13 +237,30 @@ def test_convert_takes_typed_numbers(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert "NAME=NUMBER" in complaint(capsys, "convert", "--params", "fx=a", *typed[2:], out)
 
 
-def test_help_and_version_are_quick_and_quiet() -> None:
+def test_help_and_version_are_quiet() -> None:
     for flag in ("--help", "--version"):
         result = subprocess.run(
             [sys.executable, "-m", "opencsp_calib", flag], capture_output=True, text=True, check=True
         )
         assert result.stdout
         assert result.stderr == ""
+
+
+def test_help_is_quick_as_it_loads_nothing_that_it_does_not_need() -> None:
+    command = [sys.executable, "-X", "importtime", "-m", "opencsp_calib", "calibrate", "--help"]
+    result = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "--board SPEC" in result.stdout
+    assert "Solving:" in result.stdout
+    loaded = set(re.findall(r"\| +(\w+)", result.stderr))
+    assert "typer" in loaded
+    assert not loaded & {"numpy", "scipy", "cv2", "matplotlib", "h5py", "numba", "rich", "nicegui", "distributed"}
+
+
+def test_no_command_at_all_is_answered_with_the_help() -> None:
+    result = subprocess.run([sys.executable, "-m", "opencsp_calib"], capture_output=True, text=True)
+    assert result.returncode == 2
+    assert "Commands:" in result.stderr
+    assert "error:" not in result.stderr
 
 
 # --- bad input --------------------------------------------------------------------------------------------------------

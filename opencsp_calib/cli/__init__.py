@@ -12,6 +12,7 @@ import typer
 
 from opencsp_calib.cli import calibrating, cameras, capturing, checking, converting, fleets, setting_up, window
 from opencsp_calib.cli.console import complain, say
+from opencsp_calib.cli.help import CommandWithSections, first_line
 from opencsp_calib.cli.setting_up import print_versions
 from opencsp_calib.cli.stopping import stop_when_told, was_told
 from opencsp_calib.errors import CalibError
@@ -23,24 +24,28 @@ INTERRUPTED = 130  # what the argument parser returns for KeyboardInterrupt
 app = typer.Typer(
     name="opencsp-calib",
     help="Camera calibration that a metrologist trusts and a newcomer gets right the first time.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 for module in (calibrating, cameras, capturing, converting, checking, fleets, setting_up, window):
     for command in module.COMMANDS:
-        app.command()(command)
+        app.command(cls=CommandWithSections, short_help=first_line(command))(command)
 
 
 @app.callback(invoke_without_command=True)
 def options(
+    context: typer.Context,
     show_version: bool = typer.Option(False, "--version", help="Print the version, and those of the engines."),
 ) -> None:
     """Camera calibration that a metrologist trusts and a newcomer gets right the first time."""
     if show_version:
         print_versions()
         raise typer.Exit
+    if context.invoked_subcommand is None:
+        say(context.get_help())
+        raise typer.Exit(2)
 
 
 def main() -> None:

@@ -13,14 +13,15 @@ if TYPE_CHECKING:
 SOLVING = "Solving"
 OUTPUT = "Output"
 
-Images = Annotated[list[str], typer.Argument(metavar="IMAGES...", help="Image files, folders, or glob patterns.")]
+Images = Annotated[list[str], typer.Argument(metavar="IMAGES", help="Image files, folders, or glob patterns.")]
 BoardSpec = Annotated[
     str,
     typer.Option(
         "--board",
         metavar="SPEC",
         help="checkerboard:COLUMNSxROWS:SIZE (inner corners, such as checkerboard:18x23:50mm), "
-        "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY[:inverted][:legacy] (squares), or a board file.",
+        "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY (squares; followed by :inverted or :legacy where it is so), "
+        "or a board file.",
     ),
 ]
 OptionalBoardSpec = Annotated[
@@ -55,7 +56,14 @@ Model = Annotated[
     str | None, typer.Option(metavar="MODEL", help="The lens model.", show_default="opencv4", rich_help_panel=SOLVING)
 ]
 SolverName = Annotated[
-    str | None, typer.Option("--solver", metavar="NAME", show_default="bundle", rich_help_panel=SOLVING)
+    str | None,
+    typer.Option(
+        "--solver",
+        metavar="NAME",
+        help="Which solver finds the camera; `plugins` lists them.",
+        show_default="bundle",
+        rich_help_panel=SOLVING,
+    ),
 ]
 BoardShapeOption = Annotated[
     Literal["flat", "warp", "free", "auto"] | None,
