@@ -2,6 +2,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Python compiles what it imports when it does; compiling all that is installed takes most of the installation's time.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
 .PHONY: demo test pythons beside-opencsp lint docs bench pictures mutants coverage release clean help
 
@@ -39,17 +41,16 @@ docs: $(VENV)/.docs
 	$(BIN)/sphinx-build -W -q -b html docs docs/_build
 
 bench: $(VENV)/.dev
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group studies
+	$(INSTALL) --group studies
 	$(BIN)/python validation/bench.py
 
 pictures: $(VENV)/.dev
 	for script in photographs lens_models screenshots; do $(BIN)/python docs/scripts/$$script.py; done
 
-# One change to the code at a time: does a test notice? Hours; apart from make test.
+# One change to the code at a time: does a test notice? An hour; apart from make test.
 mutants: $(VENV)/.dev
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group mutants
-	$(BIN)/python -m mutmut run
-	$(BIN)/python -m mutmut results
+	$(INSTALL) --group studies
+	$(BIN)/python validation/bench.py mutants
 
 coverage: $(VENV)/.dev
 	$(BIN)/python -m pytest -n 2 --cov=opencsp_calib --cov-report=term-missing:skip-covered --cov-fail-under=95
@@ -59,7 +60,7 @@ release: $(VENV)/.dev
 	rm -rf dist .venv-release
 	$(BIN)/python -m hatchling build --directory dist
 	$(PYTHON) -m venv .venv-release
-	.venv-release/bin/python -m pip install --quiet --disable-pip-version-check "$$(ls dist/*.whl)[all]"
+	.venv-release/bin/python -m pip install --quiet --disable-pip-version-check --no-compile "$$(ls dist/*.whl)[all]"
 	cd dist && ../.venv-release/bin/opencsp-calib --version && ../.venv-release/bin/opencsp-calib plugins
 	cd dist && ../.venv-release/bin/opencsp-calib demo demo --views 10
 	rm -rf .venv-release dist/demo
@@ -67,18 +68,18 @@ release: $(VENV)/.dev
 # What users of the main job install; quick when it is there.
 $(VENV)/.core: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[opencv]'
+	$(INSTALL) --upgrade 'pip>=25.1'
+	$(INSTALL) --editable '.[opencv]'
 	touch $@
 
 # Everything there is, with mrcal and Chromium from Debian where this machine may install them.
 $(VENV)/.dev: $(VENV)/.core .ci/system-packages
 	sh .ci/system-packages
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[all]' --group dev
+	$(INSTALL) --editable '.[all]' --group dev
 	touch $@
 
 $(VENV)/.docs: $(VENV)/.dev
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --group docs
+	$(INSTALL) --group docs
 	touch $@
 
 clean:

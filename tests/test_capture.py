@@ -1,10 +1,12 @@
 """A capture: photographs at the right moments and only then, whole on the disk whatever happens."""
 
+import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -256,21 +258,28 @@ def test_keys_release_delete_and_stop(world, tmp_path):
     incoming.mkdir()
     source = render(world.camera, world.board, world.poses[0], samples=2)
 
-    def deliver(number: int) -> None:
-        write_image(source.pixels + np.uint8(number), incoming / f"{number}.png")
+    over = threading.Event()
 
+    def deliver() -> None:
+        for number in itertools.count():
+            write_image(source.pixels + np.uint8(number % 200), incoming / f"{number}.png")
+            if over.wait(0.2):
+                return
+
+    camera = threading.Thread(target=deliver)
     with started(tmp_path / "set", incoming, "--release", "manual", "--set", "wait=60") as process:
-        for number, key in enumerate((" ", "\n", " "), start=1):
-            process.stdin.write(key)
+        camera.start()
+        try:
+            for number, key in enumerate((" ", "\n", " "), start=1):
+                process.stdin.write(key)
+                process.stdin.flush()
+                wait_for(process, f"000{number}.png: {number} of 50")
+            process.stdin.write("dq")
             process.stdin.flush()
-            time.sleep(0.3)
-            deliver(number)
-            wait_for(process, f"000{number}.png: {number} of 50")
-        process.stdin.write("dq")
-        process.stdin.flush()
-        time.sleep(0.3)
-        deliver(4)
-        assert "2 of 50 photographs are in" in process.stderr.read()
+            assert "2 of 50 photographs are in" in process.stderr.read()
+        finally:
+            over.set()
+            camera.join()
     assert process.returncode == 0
 
 

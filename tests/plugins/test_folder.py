@@ -48,7 +48,7 @@ def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path):
             time.sleep(0.5)
             file.write(data[len(data) // 2 :])
 
-    with FolderSource().open(str(tmp_path), wait=2) as images:
+    with FolderSource().open(str(tmp_path), wait=30) as images:
         assert levels(islice(images, 1)) == [7]
         writer = threading.Thread(target=another_program)
         writer.start()

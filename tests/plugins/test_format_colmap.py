@@ -135,10 +135,10 @@ def test_what_cannot_be_carried_is_not_written(tmp_path: Path) -> None:
 def test_binary_files_that_lie(data: bytes, message: str, tmp_path: Path) -> None:
     path = tmp_path / "cameras.bin"
     path.write_bytes(data)
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(FileFormatError, match=message):
         ColmapBinary().read(path)
-    assert time.perf_counter() - started < 1
+    assert time.process_time() - started < 5
 
 
 @pytest.mark.parametrize(

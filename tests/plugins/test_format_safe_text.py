@@ -90,10 +90,10 @@ def test_aliases_within_bounds() -> None:
 @pytest.mark.parametrize("parse", [parse_yaml, parse_json, parse_toml, parse_literal])
 @pytest.mark.parametrize("opening", OPENINGS)
 def test_nothing_takes_long(parse: Any, opening: str) -> None:
-    started = time.perf_counter()
+    started = time.process_time()
     with contextlib.suppress(FileFormatError):
         parse(("a = " if parse is parse_toml else "") + opening * 200_000)
-    assert time.perf_counter() - started < 5
+    assert time.process_time() - started < 5
 
 
 def test_a_key_that_is_there_twice_is_an_error_when_asked_for() -> None:

@@ -115,10 +115,10 @@ def test_being_killed_is_one_line(python):
 
 
 def test_a_hang_ends_even_with_a_child_that_holds_its_streams(python):
-    python("import subprocess\nsubprocess.Popen(['sleep', '20'])\ntime.sleep(20)")
+    python("import subprocess\nsubprocess.Popen(['sleep', '90'])\ntime.sleep(90)")
     start = time.monotonic()
     assert "did not end within 1 s" in failure(timeout_s=1.0)
-    assert time.monotonic() - start < 8
+    assert time.monotonic() - start < 60
 
 
 @pytest.mark.parametrize(
