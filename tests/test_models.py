@@ -23,6 +23,7 @@ DISTORTION = {
     "opencv14": [-0.2, 0.1, 1e-3, -2e-3, 0.03, 0.1, 0.02, 0.01, 1e-3, -1e-3, 2e-3, 5e-4, 0.02, -0.03],
     "opencv_fisheye": [0.02, -0.01, 0.003, -0.001],
 }
+OPENCV_ORDER = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
 CAMERAS = {model: Camera("test", model, PINHOLE + d, SIZE) for model, d in DISTORTION.items()}
 
 every_model = pytest.mark.parametrize("model", LENS_MODELS)
@@ -30,6 +31,12 @@ every_model = pytest.mark.parametrize("model", LENS_MODELS)
 
 def test_every_lens_model_is_tested() -> None:
     assert set(CAMERAS) == set(LENS_MODELS)
+
+
+@every_model
+def test_parameters_are_called_and_ordered_as_opencv_documents_them(model: str) -> None:
+    order = ("k1", "k2", "k3", "k4") if model == "opencv_fisheye" else OPENCV_ORDER[: len(DISTORTION[model])]
+    assert LENS_MODELS[model].parameter_names == ("fx", "fy", "cx", "cy", *order)
 
 
 def grid(size: tuple[int, int] = SIZE) -> np.ndarray:
