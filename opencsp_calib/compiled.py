@@ -20,7 +20,7 @@ __all__ = ["FitCorners", "corner_fit", "prepare"]
 
 FitCorners: TypeAlias = Callable[..., None]
 
-SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, b1, f8[::1], f8[:, ::1])"
+SIGNATURE = "void(u2[:, ::1], f8, f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, i8, b1, f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 KERNEL = Path(__file__).with_name("corner_kernel")
 
 _log = logging.getLogger(__name__)

@@ -9,6 +9,7 @@ from opencsp_calib.arrays import Floats, Ids, Mask, Pixels
 __all__ = ["bends", "displaced", "edges", "parity"]
 
 ROBUST_STEPS = 5
+SINGULAR = 1e-12  # of the largest eigenvalue
 LEAST_DISPLACED_PX, LEAST_DISPLACED_DEVIATIONS = 0.5, 10.0
 
 
@@ -146,13 +147,22 @@ def _smoothed(measured: Floats, row: Ids, column: Ids) -> tuple[Floats, Floats]:
     degree = max(d for d in range(4) if (d + 1) * (d + 2) // 2 * 3 <= n)
     x, y = row / (np.ptp(row) + 1) - 0.5, column / (np.ptp(column) + 1) - 0.5
     terms = np.stack([x**i * y**j for i in range(degree + 1) for j in range(degree + 1 - i)], axis=1)
-    design, values = terms[known], measured[known]
+    basis = _orthonormal(terms[known])
+    design, values = terms[known] @ basis, measured[known]
     weights = np.ones(n)
     for _ in range(ROBUST_STEPS):
         weighted = design * weights[:, None]
-        inverse = np.linalg.pinv(weighted.T @ design, hermitian=True)
+        inverse = np.linalg.inv(weighted.T @ design)
         residuals = values - design @ (inverse @ (weighted.T @ values))
         scale = 1.4826 * float(np.median(np.abs(residuals))) + 1e-12
         weights = 1 / (1 + (residuals / (2 * scale)) ** 2)
-    coefficients = inverse @ (weighted.T @ values)
-    return terms @ coefficients, scale * np.sqrt(np.einsum("ni,ij,nj->n", terms, inverse, terms))
+    coefficients = basis @ (inverse @ (weighted.T @ values))
+    spread = terms @ basis
+    return terms @ coefficients, scale * np.sqrt(((spread @ inverse) * spread).sum(axis=1))
+
+
+def _orthonormal(terms: Floats) -> Floats:
+    """What to multiply the terms by to make their columns orthonormal, less those that others make up."""
+    sizes, axes = np.linalg.eigh(terms.T @ terms)
+    told_apart = sizes > SINGULAR * sizes[-1]
+    return np.asarray(axes[:, told_apart] / np.sqrt(sizes[told_apart]))

@@ -69,11 +69,13 @@ def rejections(
     ]
     plausible = ~np.any([wrong for _, wrong in verdicts], axis=0)
     verdicts.append(("not where its neighbours on the board place it", _displaced(fit, detection, columns, plausible)))
-    reasons = np.select([wrong for _, wrong in verdicts], [reason for reason, _ in verdicts], default="")
-    return [
-        RejectedCorner(int(corner), (float(x), float(y)), str(reason)) if reason else None
-        for corner, (x, y), reason in zip(detection.ids, detection.pixels, reasons, strict=True)
-    ]
+    wrongs = np.array([wrong for _, wrong in verdicts])
+    rejected: list[RejectedCorner | None] = [None] * len(detection)
+    for index in np.flatnonzero(wrongs.any(axis=0)):
+        reason, _ = verdicts[int(wrongs[:, index].argmax())]
+        x, y = detection.pixels[index].tolist()
+        rejected[index] = RejectedCorner(int(detection.ids[index]), (x, y), reason)
+    return rejected
 
 
 def summary(rejected: tuple[RejectedCorner, ...], of: int) -> str:

@@ -7,7 +7,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Mask
 from opencsp_calib.compiled import corner_fit
 from opencsp_calib.corner_fit import CornerFit, Levels
-from opencsp_calib.corner_kernel.layout import DIAGNOSTICS, FAILED, RAMP_PX, WORK_SIZE
+from opencsp_calib.corner_kernel.layout import COLUMNS, DIAGNOSTICS, FAILED, MOST_PIXELS, RAMP_PX, SIDE
 
 __all__ = ["FULL", "NEAR", "SMALL", "Surroundings", "WindowSize"]
 
@@ -73,10 +73,10 @@ class Surroundings:
         chosen = np.flatnonzero(where & np.isfinite(windows[:, 0]))
         parameters = start.parameters[chosen]
         found = np.zeros((len(chosen), DIAGNOSTICS))
-        room = np.empty(WORK_SIZE)
+        table, picture = np.empty((COLUMNS, MOST_PIXELS)), np.empty((SIDE, SIDE))
         corner_fit()(
             self.image, float(self.white), parameters, self.bends[chosen], windows[chosen],
-            size.tolerance_px, MOST_STEPS, examine, room, found,
+            size.tolerance_px, MOST_STEPS, examine, table, picture, found,
         )  # fmt: skip
         nothing = CornerFit(start.parameters, np.full((len(where), DIAGNOSTICS), float(FAILED)))
         return nothing.replaced(chosen, CornerFit(parameters, found))

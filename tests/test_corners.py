@@ -422,14 +422,14 @@ def test_derivatives_are_those_of_the_model(second_edge: float) -> None:
     from opencsp_calib.corner_kernel.image_model import differentiate
 
     grid = np.random.default_rng(1).uniform(-6, 6, (2, 200))
-    work = np.zeros(kernel.WORK_SIZE)
+    table = np.zeros((kernel.COLUMNS, kernel.MOST_PIXELS))
     p = np.array([0.2, -0.1, 0.15, second_edge, 1.3, 100.0, 60.0, 0.03, -0.02, 0.01, 0.02])
 
     def columns(p: Floats) -> Floats:
-        work[kernel.X : kernel.X + 200] = grid[0] - p[0]
-        work[kernel.Y : kernel.Y + 200] = grid[1] - p[1]
-        differentiate(p, 0.002, -0.001, np.array([100.0, 100.0, np.inf, np.inf]), 200, work)
-        return work[: kernel.RESIDUAL + kernel.STRIDE].reshape(-1, kernel.STRIDE)[:, :200].copy()
+        table[kernel.X, :200] = grid[0] - p[0]
+        table[kernel.Y, :200] = grid[1] - p[1]
+        differentiate(p, 0.002, -0.001, np.array([100.0, 100.0, np.inf, np.inf]), 200, table)
+        return table[: kernel.RESIDUAL + 1, :200].copy()
 
     analytic = columns(p)
     for k in range(kernel.PARAMETERS):

@@ -34,7 +34,7 @@ def _fit(
     window: Floats,
     tolerance: float,
     most_steps: int,
-    work: Floats,
+    table: Floats,
     normal: Floats,
     factor: Floats,
     step: Floats,
@@ -43,11 +43,11 @@ def _fit(
     n, best, calm = 0, math.inf, 1.0
     step[:] = 0.0
     for _ in range(most_steps):
-        n = gather(image, p, window, work)
+        n = gather(image, p, window, table)
         if n < 3 * PARAMETERS:
             return OUTSIDE, n
-        weight = differentiate(p, bends[0], bends[1], window, n, work)
-        accumulate(work, n, normal)
+        weight = differentiate(p, bends[0], bends[1], window, n, table)
+        accumulate(table, n, normal)
         misfit = normal[PARAMETERS, PARAMETERS] / weight
         if misfit > 1.1 * best:  # not just more: as the window moves with the corner, the root is not quite the minimum
             _take_half_back(p, step)
@@ -66,7 +66,7 @@ def _fit(
         close &= abs(step[5]) + abs(step[6]) < SETTLED * abs(p[6])
         _take(p, step, calm * _trusted_part(p, step))
         if close:
-            take_from_residuals(work, n, step)
+            take_from_residuals(table, n, step)
             return CONVERGED, n
     return FAILED, n
 
@@ -106,7 +106,8 @@ def fit_corners(
     tolerance: float,
     most_steps: int,
     examine: bool,
-    work: Floats,
+    table: Floats,
+    picture: Floats,
     found: Floats,
 ) -> None:
     """Fit corner after corner, in place.
@@ -128,7 +129,8 @@ def fit_corners(
     most_steps : int
     examine : bool
         Whether all that is found is wanted, not only the status.
-    work : (WORK_SIZE,)
+    table : (COLUMNS, MOST_PIXELS)
+    picture : (SIDE, SIDE)
         Room to work in.
     found : (n, 23)
         In: zeros. Out: status; variance of residuals, without what is alike on opposite sides of the corner; variance
@@ -143,8 +145,8 @@ def fit_corners(
     step = np.empty(PARAMETERS)
     for c in range(len(parameters)):
         p, result = parameters[c], found[c]
-        result[0], n = _fit(image, p, bends[c], windows[c], tolerance, most_steps, work, normal, factor, step)
+        result[0], n = _fit(image, p, bends[c], windows[c], tolerance, most_steps, table, normal, factor, step)
         if examine and result[0] == CONVERGED:
-            examine_place(p, n, work, factor, pulls, step, result)
-            examine_quarters(p, n, white, work, result)
-            examine_opposites(p, n, work, result)
+            examine_place(p, n, table, factor, pulls, step, result)
+            examine_quarters(p, n, white, table, result)
+            examine_opposites(p, n, table, picture, result)

@@ -1,14 +1,21 @@
-"""How the parts of the kernel become machine code. Importing this imports Numba: see `opencsp_calib.compiled`."""
+"""How the parts of the kernel become machine code. Importing this imports Numba: see `opencsp_calib.compiled`.
+
+Loops over pixels count with `unsigned`: an index that might be negative is looked at each time, as Python counts such
+from the end, and then the loop does one pixel at a time instead of four.
+"""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
+import numpy as np
 from numba import njit
 
-__all__ = ["exact", "fast"]
+__all__ = ["exact", "fast", "unsigned"]
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+unsigned = np.uint64
 
 
 def exact(function: Callable[P, T]) -> Callable[P, T]:

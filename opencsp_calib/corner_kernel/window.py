@@ -22,8 +22,8 @@ def _overlap(offset: float, slope: float, half: float, low: float, high: float) 
 
 
 @exact
-def gather(image: NDArray[np.uint16], p: Floats, window: Floats, work: Floats) -> int:
-    """Copy the window's pixels into the buffer, x and y from the corner on; how many, or -1 if some are outside."""
+def gather(image: NDArray[np.uint16], p: Floats, window: Floats, table: Floats) -> int:
+    """Copy the window's pixels into the table, x and y from the corner on; how many, or -1 if some are outside."""
     height, width = image.shape
     x1, y1, x2, y2 = math.cos(p[2]), math.sin(p[2]), math.cos(p[3]), math.sin(p[3])
     half1, half2 = window[0] + 0.5 * RAMP_PX, window[1] + 0.5 * RAMP_PX
@@ -38,8 +38,8 @@ def gather(image: NDArray[np.uint16], p: Floats, window: Floats, work: Floats) -
         low, high = _overlap(x2 * y, y2, half1 * sine, -reach_x, reach_x)
         low, high = _overlap(x1 * y, y1, half2 * sine, low, high)
         for column in range(math.ceil(low + p[0]), math.floor(high + p[0]) + 1):
-            work[X + n] = column - p[0]
-            work[Y + n] = y
-            work[LEVEL + n] = image[row, column]
+            table[X, n] = column - p[0]
+            table[Y, n] = y
+            table[LEVEL, n] = image[row, column]
             n += 1
     return n

@@ -7,7 +7,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.board import Board, CharucoBoard
 from opencsp_calib.image import Image
-from opencsp_calib.photograph.sampling import bilinear
+from opencsp_calib.photograph.sampling import nearest
 
 __all__ = ["Light", "measured_light", "square_heights"]
 
@@ -61,7 +61,7 @@ def measured_light(image: Image, grid: Floats, board: Board) -> Light | None:
         None where hardly a square is to be seen.
     """
     places = _places(grid, _inside(board))
-    levels = bilinear(image, places)
+    levels = nearest(image, places)
     seen = np.isfinite(levels).all(axis=2)
     row, column = np.indices(seen.shape)
     even = seen & ((row + column) % 2 == 0)
@@ -101,7 +101,7 @@ def _inside(board: Board) -> Matrix:
         along = np.array([near, 0.3, 0.5, 0.7, 1 - near])
         points = np.array([(u, v) for u in along for v in along])
         return np.asarray(points[np.abs(points - 0.5).max(axis=1) > 0.5 - 2 * near])
-    along = np.linspace(0.25, 0.75, 5)
+    along = np.linspace(0.25, 0.75, 4)
     return np.array([(u, v) for u in along for v in along])
 
 
