@@ -1,6 +1,7 @@
 """Looking at many images at once: several at a time, in bounded memory, in order, with nothing done twice."""
 
 import os
+import sys
 import threading
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -20,11 +21,14 @@ from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
 from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
+from opencsp_calib.process_setting import ProcessSetting, Restore
 
 __all__ = ["Progress", "Stop", "look_at", "usable_cores"]
 
 Progress: TypeAlias = Callable[[int, int, View], None]
 Stop: TypeAlias = threading.Event
+
+TURN_S = 0.0005
 
 
 def look_at(
@@ -64,6 +68,7 @@ def look_at(
     with ExitStack() as stack:
         stack.enter_context(opencv_on_one_thread())
         stack.enter_context(blas_on_one_thread())
+        stack.enter_context(_quick_turns.changed())
         if journal is not None:
             stack.enter_context(journal.open(search.key))
         if scheduler is not None:
@@ -81,6 +86,16 @@ def usable_cores() -> int:
     """How many cores this process may use."""
     affinity = getattr(os, "sched_getaffinity", None)  # not on Windows and macOS
     return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+def _take_turns_quickly() -> Restore:
+    """Threads wait less for Python's lock: with the usual 5 ms, the cores stand still for a tenth of the time."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(min(TURN_S, before))
+    return lambda: sys.setswitchinterval(before)
+
+
+_quick_turns = ProcessSetting(_take_turns_quickly)
 
 
 def _look(file: ImageFile, examine: Callable[[EncodedImage], Look], journal: Journal | None) -> Look:

@@ -3,17 +3,13 @@
 Any cv2 serves, whichever of its four packages it came with: OpenCSP's environment has one that must not be replaced.
 """
 
-import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from typing import Any
 
 from opencsp_calib.errors import MissingDependencyError
+from opencsp_calib.process_setting import ProcessSetting, Restore
 
 __all__ = ["opencv", "opencv_on_one_thread", "opencv_version"]
-
-_lock = threading.Lock()
-_before: list[int] = []  # OpenCV's number of threads, as each of those now inside `opencv_on_one_thread` found it
 
 
 def opencv() -> Any:
@@ -37,20 +33,16 @@ def opencv_version() -> str:
     return str(opencv().__version__)
 
 
-@contextmanager
-def opencv_on_one_thread() -> Iterator[None]:
-    """OpenCV's own threads off while ours are at work, so that they do not fight over the cores; then as before.
+def opencv_on_one_thread() -> AbstractContextManager[None]:
+    """OpenCV's own threads off, in the whole process, so that they do not fight ours over the cores; then as before."""
+    return _one_thread.changed()
 
-    The setting is one for the whole process: where several are inside at once, the last to leave restores it.
-    """
+
+def _change() -> Restore:
     cv2 = opencv()
-    with _lock:
-        _before.append(cv2.getNumThreads())
-        cv2.setNumThreads(1)
-    try:
-        yield
-    finally:
-        with _lock:
-            if len(_before) == 1:
-                cv2.setNumThreads(_before[0])
-            _before.pop()
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    return lambda: cv2.setNumThreads(before)
+
+
+_one_thread = ProcessSetting(_change)

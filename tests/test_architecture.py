@@ -13,7 +13,7 @@ CORE = Path(opencsp_calib.__file__).parent
 PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
-    "errors",
+    "errors process_setting",
     "arrays atomic opencv blas provenance seal",
     "models",
     "camera rotations convex_hull board",
