@@ -24,15 +24,22 @@ only-include = ["broken_plugin.py"]
 """
 
 
-@pytest.fixture
-def environment(tmp_path: Path) -> Environment:
+@pytest.fixture(scope="module")
+def environment(tmp_path_factory: pytest.TempPathFactory) -> Environment:
     pytest.importorskip("hatchling", reason="the example is built with hatchling")
-    return Environment(tmp_path / "environment")
+    return Environment(tmp_path_factory.mktemp("environment") / "environment")
 
 
-def test_the_example_is_found_keeps_its_promises_and_goes_away_again(environment: Environment, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def before(environment: Environment) -> set[tuple[str, str]]:
+    """What is provided without any plugin of a stranger."""
+    return environment.plugins()
+
+
+def test_the_example_is_found_keeps_its_promises_and_goes_away_again(
+    environment: Environment, before: set[tuple[str, str]], tmp_path: Path
+) -> None:
     provided = {("board", "circles"), ("detector", "circles"), ("camera format", "open3d")}
-    before = environment.plugins()
     assert not provided & before
     example = shutil.copytree(EXAMPLE, tmp_path / "example", ignore=shutil.ignore_patterns("__pycache__"))
     environment.install(example)
@@ -47,8 +54,9 @@ def test_the_example_is_found_keeps_its_promises_and_goes_away_again(environment
     assert environment.plugins() == before
 
 
-def test_a_broken_one_is_left_out_with_a_warning(environment: Environment, tmp_path: Path) -> None:
-    before = environment.plugins()
+def test_a_broken_one_is_left_out_with_a_warning(
+    environment: Environment, before: set[tuple[str, str]], tmp_path: Path
+) -> None:
     project = tmp_path / "broken"
     project.mkdir()
     (project / "pyproject.toml").write_text(BROKEN)
