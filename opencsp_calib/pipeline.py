@@ -37,6 +37,7 @@ __all__ = [
     "PixelAspect",
     "board_from",
     "calibrate",
+    "check_board_seen",
     "detect",
     "places_of",
     "select",
@@ -275,12 +276,22 @@ def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
     raise InputError(f"the solver {engine.name!r} {what}; solvers that are able: {', '.join(able) or 'none installed'}")
 
 
-def _check_views(observations: Observations) -> None:
-    used, looked_at = len(observations.used), len(observations.views)
-    if used == 0:
+def check_board_seen(observations: Observations) -> None:
+    """Refuse a set in which no image shows the board, with the most frequent reason.
+
+    Raises
+    ------
+    InputError
+    """
+    if not observations.used:
         reasons = [view.detection.reason for view in observations.views if view.detection.reason]
         why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
-        raise InputError(f"no board to calibrate from in any of the {looked_at} images: {why}")
+        raise InputError(f"no board to calibrate from in any of the {len(observations.views)} images: {why}")
+
+
+def _check_views(observations: Observations) -> None:
+    check_board_seen(observations)
+    used, looked_at = len(observations.used), len(observations.views)
     if used < MIN_VIEWS:
         raise InputError(
             f"the board is found in only {used} of {looked_at} images; a calibration needs at least {MIN_VIEWS} views, "

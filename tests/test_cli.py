@@ -337,6 +337,9 @@ def test_no_board_anywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     for index in range(3):
         write_image(np.full((480, 640), 60 + index, np.uint8), tmp_path / f"{index}.png")
     assert "in any of the 3 images" in complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec)
+    seen = tmp_path / "seen.h5"
+    assert "in any of the 3 images" in complaint(capsys, "detect", tmp_path, "--board", SmallWorld.spec, "-o", seen)
+    assert not seen.exists()
 
 
 def test_too_few_views(photographs: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -126,6 +126,7 @@ def detect(
         found = detected_aloud(
             images, target, journal, jobs=jobs, scheduler=scheduler, detector=detector, refine=refine
         )
+        pipeline.check_board_seen(found)
         save_observations(found, output)
     seconds = {"detect": time.perf_counter() - started}
     say(f"{_count(found)}; saved {output}")
@@ -275,7 +276,8 @@ def _say_result(result: "Calibration", before: "Calibration | None") -> None:
     camera = result.camera
     size = "x".join(map(str, camera.image_size))
     say(f"{camera.name}: {camera.model}, {size}, {result.solver}, board {result.options.board_shape}")
-    rejected = f", {result.rejected_corners} corners rejected" if result.rejected_corners else ""
+    outliers = result.rejected_corners
+    rejected = f", {outliers} corner{'s' * (outliers > 1)} rejected" if outliers else ""
     say(f"{_count(result.observations)}, rms {result.rms_px:.4f} px{rejected}")
     if before is not None:
         say(f"before images were dropped: {_count(before.observations)}, rms {before.rms_px:.4f} px")
