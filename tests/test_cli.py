@@ -333,6 +333,13 @@ def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, c
     np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt"])
+def test_a_camera_file_is_not_named_like_another_format(name, tmp_path: Path, capsys) -> None:
+    said = complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / name)
+    assert "let its name end in .h5" in said
+    assert "convert" in said
+
+
 def test_no_board_anywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for index in range(3):
         write_image(np.full((480, 640), 60 + index, np.uint8), tmp_path / f"{index}.png")

@@ -115,11 +115,10 @@ def detect(
 ) -> None:
     """Find the board in photographs, and keep what was found for `solve`."""
     from opencsp_calib import pipeline
-    from opencsp_calib.atomic import check_writable
     from opencsp_calib.hdf5_calibration import save_observations
     from opencsp_calib.summary import observations_as_json
 
-    check_writable(output)
+    _check_targets(output)
     started = time.perf_counter()
     target = pipeline.board_from(board)
     with kept_beside(output, resume) as journal:
@@ -224,13 +223,23 @@ def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
     return record | ({PIXEL_PITCH: f"{pixel_pitch:g}"} if pixel_pitch else {})
 
 
-def _check_targets(*paths: Path | None) -> None:
-    """Before any work: whether its results can be written."""
+def _check_targets(output: Path | None, report: Path | None = None) -> None:
+    """Before any work: whether its results can be written, and have names that say what they are."""
     from opencsp_calib.atomic import check_writable
+    from opencsp_calib.registry import installed
 
-    for path in paths:
+    for path in (output, report):
         if path is not None:
             check_writable(path)
+    ending = output.suffix.lower() if output else ""
+    others = [
+        f.title for f in installed().camera_formats.values() if ending in f.extensions and ".h5" not in f.extensions
+    ]
+    if others:
+        raise InputError(
+            f"{output} would be HDF5 under the name of something else ({', '.join(others)}): let its name end in .h5; "
+            "`opencsp-calib convert` then writes other formats"
+        )
 
 
 def _check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:
