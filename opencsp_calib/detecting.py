@@ -23,7 +23,7 @@ from opencsp_calib.looking import Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.process_setting import ProcessSetting, Restore
 
-__all__ = ["Progress", "Stop", "look_at", "usable_cores"]
+__all__ = ["Progress", "Stop", "check_board_seen", "look_at", "usable_cores"]
 
 Progress: TypeAlias = Callable[[int, int, View], None]
 Stop: TypeAlias = threading.Event
@@ -80,6 +80,19 @@ def look_at(
                 prepare()  # loads the compiled fit while the first images are read
         looks = _in_threads(files, lambda file: _look(file, examine, journal), threads, ended, progress, stop)
     return _gathered(looks, search.board)
+
+
+def check_board_seen(observations: Observations) -> None:
+    """Refuse a set in which no image shows the board, with the most frequent reason.
+
+    Raises
+    ------
+    InputError
+    """
+    if not observations.used:
+        reasons = [view.detection.reason for view in observations.views if view.detection.reason]
+        why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
+        raise InputError(f"no board to calibrate from in any of the {len(observations.views)} images: {why}")
 
 
 def usable_cores() -> int:

@@ -16,7 +16,7 @@ from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.cluster import Scheduler
-from opencsp_calib.detecting import Progress, Stop, look_at
+from opencsp_calib.detecting import Progress, Stop, check_board_seen, look_at
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5_calibration import load_calibration
@@ -37,7 +37,6 @@ __all__ = [
     "PixelAspect",
     "board_from",
     "calibrate",
-    "check_board_seen",
     "detect",
     "places_of",
     "select",
@@ -274,19 +273,6 @@ def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
     solvers = sorted(installed().solvers.values(), key=lambda solver: solver.name)
     able = [s.name for s in solvers if model in s.models and options.asked <= s.abilities and s.missing() is None]
     raise InputError(f"the solver {engine.name!r} {what}; solvers that are able: {', '.join(able) or 'none installed'}")
-
-
-def check_board_seen(observations: Observations) -> None:
-    """Refuse a set in which no image shows the board, with the most frequent reason.
-
-    Raises
-    ------
-    InputError
-    """
-    if not observations.used:
-        reasons = [view.detection.reason for view in observations.views if view.detection.reason]
-        why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
-        raise InputError(f"no board to calibrate from in any of the {len(observations.views)} images: {why}")
 
 
 def _check_views(observations: Observations) -> None:

@@ -9,12 +9,12 @@ import typer
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import print_json, progress_bar, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud, kept_beside
+from opencsp_calib.cli.targets import check_not_input, check_targets
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
     from opencsp_calib.calibration import Calibration
     from opencsp_calib.detection import Observations
-    from opencsp_calib.images import ImageFile
 
 
 def calibrate(
@@ -60,7 +60,7 @@ def calibrate(
     from opencsp_calib.images import as_text, find_images
     from opencsp_calib.options import aspect_from
 
-    _check_targets(output, report)
+    check_targets(output, report)
     options = _preset(
         preset,
         detector=detector,
@@ -76,7 +76,7 @@ def calibrate(
     started = time.perf_counter()
     target = pipeline.board_from(board)
     files = find_images(images)
-    _check_not_input(files, output, report)
+    check_not_input(files, output, report)
     record = _record(note or [], pixel_pitch)
     options |= args.given(guess=args.guess_from(guess))
     options |= {
@@ -115,17 +115,18 @@ def detect(
 ) -> None:
     """Find the board in photographs, and keep what was found for `solve`."""
     from opencsp_calib import pipeline
+    from opencsp_calib.detecting import check_board_seen
     from opencsp_calib.hdf5_calibration import save_observations
     from opencsp_calib.summary import observations_as_json
 
-    _check_targets(output)
+    check_targets(output)
     started = time.perf_counter()
     target = pipeline.board_from(board)
     with kept_beside(output, resume) as journal:
         found = detected_aloud(
             images, target, journal, jobs=jobs, scheduler=scheduler, detector=detector, refine=refine
         )
-        pipeline.check_board_seen(found)
+        check_board_seen(found)
         save_observations(found, output)
     seconds = {"detect": time.perf_counter() - started}
     say(f"{_count(found)}; saved {output}")
@@ -153,7 +154,7 @@ def solve(
     from opencsp_calib.hdf5_calibration import load_observations
     from opencsp_calib.options import aspect_from
 
-    _check_targets(output, report)
+    check_targets(output, report)
     observations = load_observations(file)
     asked = args.given(
         model=model,
@@ -221,33 +222,6 @@ def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
 
     record = notes_from(notes)
     return record | ({PIXEL_PITCH: f"{pixel_pitch:g}"} if pixel_pitch else {})
-
-
-def _check_targets(output: Path | None, report: Path | None = None) -> None:
-    """Before any work: whether its results can be written, and have names that say what they are."""
-    from opencsp_calib.atomic import check_writable
-    from opencsp_calib.registry import installed
-
-    for path in (output, report):
-        if path is not None:
-            check_writable(path)
-    ending = output.suffix.lower() if output else ""
-    others = [
-        f.title for f in installed().camera_formats.values() if ending in f.extensions and ".h5" not in f.extensions
-    ]
-    if others:
-        raise InputError(
-            f"{output} would be HDF5 under the name of something else ({', '.join(others)}): let its name end in .h5; "
-            "`opencsp-calib convert` then writes other formats"
-        )
-
-
-def _check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:
-    """No result may take the place of a photograph."""
-    photographs = {file.path.resolve() for file in files}
-    for target in targets:
-        if target is not None and target.resolve() in photographs:
-            raise InputError(f"{target} is one of the photographs; give another name for the result")
 
 
 def _finish(

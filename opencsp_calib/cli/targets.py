@@ -1,0 +1,44 @@
+"""Where a command's results are to go: asked before any work is done."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from opencsp_calib.errors import InputError
+
+if TYPE_CHECKING:
+    from opencsp_calib.images import ImageFile
+
+__all__ = ["check_not_input", "check_targets"]
+
+HDF5_ENDINGS = ("", ".h5", ".hdf5", ".hdf")
+
+
+def check_targets(output: Path | None, report: Path | None = None) -> None:
+    """Before any work: whether its results can be written, and have names that say what they are."""
+    from opencsp_calib.atomic import check_writable
+
+    for path in (output, report):
+        if path is not None:
+            check_writable(path)
+    if output and output.suffix.lower() not in HDF5_ENDINGS:
+        _check_no_other_format(output)
+
+
+def _check_no_other_format(output: Path) -> None:
+    from opencsp_calib.registry import installed
+
+    ending = output.suffix.lower()
+    titles = [form.title for form in installed().camera_formats.values() if ending in form.extensions]
+    if titles:
+        raise InputError(
+            f"{output} would be HDF5 under the name of something else ({', '.join(titles)}): let its name end in .h5; "
+            "`opencsp-calib convert` then writes other formats"
+        )
+
+
+def check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:
+    """No result may take the place of a photograph."""
+    photographs = {file.path.resolve() for file in files}
+    for target in targets:
+        if target is not None and target.resolve() in photographs:
+            raise InputError(f"{target} is one of the photographs; give another name for the result")
