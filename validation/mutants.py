@@ -82,8 +82,8 @@ def mutants_of(part: Part) -> list[Mutant]:
     return found
 
 
-def notices(copy: Path, part: Part, timeout_s: float) -> bool:
-    """Whether a test of the part fails, or does not end."""
+def outcome(copy: Path, part: Part, timeout_s: float) -> str:
+    """What the tests of the part do: "pass", "fail", or "hang"."""
     tests = [f"tests/{name}.py" for name in part.tests]
     options = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", "-k", "not mrcal"]  # it starts a Python each time
     paths = os.pathsep.join(str(copy / folder) for folder in ("", "plugins"))
@@ -92,31 +92,29 @@ def notices(copy: Path, part: Part, timeout_s: float) -> bool:
     try:
         done = subprocess.run(command, cwd=copy, env=environment, capture_output=True, timeout=timeout_s)
     except subprocess.TimeoutExpired:
-        return True
-    return done.returncode != 0
+        return "hang"
+    return "fail" if done.returncode else "pass"
 
 
-def survivors(copy: Path, part: Part, chosen: list[Mutant]) -> list[Mutant]:
-    """Those that no test notices."""
+def tried(copy: Path, part: Part, chosen: list[Mutant]) -> list[str]:
+    """The outcome of each."""
     started = time.perf_counter()
-    if notices(copy, part, 600):
+    if outcome(copy, part, 600) != "pass":
         sys.exit(f"the tests of {part.name} fail without any change")
     timeout_s = 60 + 5 * (time.perf_counter() - started)
     found = []
     for number, mutant in enumerate(chosen, start=1):
         path = copy / mutant.file
         path.write_text(mutant.after, encoding="utf-8")
-        noticed = notices(copy, part, timeout_s)
+        found.append(outcome(copy, part, timeout_s))
         path.write_text(mutant.before, encoding="utf-8")
-        if not noticed:
-            found.append(mutant)
-            print(mutant.change, file=sys.stderr)
-        print(f"{part.name}: {number} of {len(chosen)}, {len(found)} survive", file=sys.stderr, flush=True)
+        print(f"{part.name}: {number} of {len(chosen)}, {found.count('pass')} survive", file=sys.stderr, flush=True)
     return found
 
 
 def main() -> None:
     """Try the parts named, or all, and print the table and what survived."""
+    os.chdir(ROOT)  # where mutmut looks for its settings
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 40
     parts = [part for part in PARTS if part.name in sys.argv[2:] or len(sys.argv) < 3]
     rows, shown = (
@@ -130,11 +128,13 @@ def main() -> None:
         for part in parts:
             every = mutants_of(part)
             drawn = np.random.default_rng(SEED).permutation(len(every))[:count]
-            left = survivors(Path(folder), part, [every[index] for index in drawn])
-            noticed = len(drawn) - len(left)
+            chosen = [every[index] for index in drawn]
+            found = tried(Path(folder), part, chosen)
+            noticed = len(found) - found.count("pass")
             low, high = binomtest(noticed, len(drawn)).proportion_ci(method="wilson")
             share = f"{noticed / len(drawn):.0%} | {low:.0%} to {high:.0%}"
-            rows.append(f"| {part.name} | {len(every)} | {len(drawn)} | {noticed} | {share} |")
+            rows.append(f"| {part.name} | {len(every)} | {len(drawn)} | {noticed} | {found.count('hang')} | {share} |")
+            left = [mutant for mutant, what in zip(chosen, found, strict=True) if what == "pass"]
             shown += [f"```diff\n{mutant.change}\n```" for mutant in left]
     print("\n".join(rows), "\nWhat survived:\n", *shown, sep="\n")
 

@@ -61,7 +61,7 @@ def run(arguments: list[str]) -> int:
     """Run one command, and give its exit code."""
     warnings.showwarning = lambda message, *_: say(f"warning: {message}")  # one line, without our source code
     try:
-        outcome = app(arguments, standalone_mode=False)
+        outcome = app(arguments, prog_name="opencsp-calib", standalone_mode=False)
     except CalibError as error:
         complain(str(error))
         return error.exit_code
@@ -80,7 +80,9 @@ def run(arguments: list[str]) -> int:
         if was_told():  # NumPy, for one, turns an interruption into a TypeError
             outcome = INTERRUPTED
         elif hasattr(error, "format_message"):  # the argument parser's
-            complain(error.format_message())
+            context = getattr(error, "ctx", None)
+            hint = f"; see `{context.command_path} --help`" if context else ""
+            complain(error.format_message().rstrip(".") + hint)
             return 2
         else:  # a defect of ours, shown whole
             raise
