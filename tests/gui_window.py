@@ -27,7 +27,10 @@ class Server:
 
     def __enter__(self) -> "Server":
         command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser"]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        environment = os.environ | {"PYLON_CAMEMU": "1"}  # Basler's emulated cameras, read when the SDK is loaded
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        )
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:([0-9]+)/\?token=([\w-]{20,})", self.address)
         assert match, self.process.communicate()
@@ -49,6 +52,24 @@ class Window:
         self.browser.get(self.server.address)
         self.until(lambda: self.element("status").text)
 
+    def leave(self) -> None:
+        """Close the page: an open one would go on looking for its server, at the cost of what follows."""
+        self.browser.get("about:blank")
+
+    def clear(self) -> None:
+        """Begin again, without photographs and results."""
+        clear = "//button[normalize-space()='Clear']"
+        self.until(lambda: not self.element("cancel").is_displayed())
+        if self.browser.find_element("xpath", clear).is_enabled():
+            self.press("Clear")
+        self.until(lambda: self.text_is_there("0 photographs"))
+
+    def has_result(self, name: str, views: int) -> bool:
+        """Whether a camera of that name is calibrated from that many photographs, with none left out."""
+        named = self.element("camera-name").get_attribute("value") == name
+        complete = self.text_is_there(f"\n{views} photographs") and not self.text_is_there("Left out:")
+        return named and complete and any(map(str.isdigit, self.rms))
+
     def element(self, testid: str) -> Any:
         return self.browser.find_element("css selector", f"[data-testid={testid}]")
 
@@ -66,7 +87,7 @@ class Window:
             if time.monotonic() > end:
                 self.picture("gave-up")
                 raise AssertionError(f"not within {patience_s} s; status: {self.status}")
-            time.sleep(0.05)
+            time.sleep(0.1)
 
     def type(self, testid: str, text: str) -> None:
         field = self.until(lambda: self.element(testid))

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
-from opencsp_calib.report.board_section import board_section
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -22,6 +21,8 @@ def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
 
     def make(calibration: Calibration) -> str:
+        from opencsp_calib.report.board_section import board_section
+
         return board_section(calibration) or AS_GIVEN
 
     return of_calibration(page, make)

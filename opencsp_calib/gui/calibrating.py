@@ -71,8 +71,9 @@ def _changing(page: "Page") -> Callable[[], None]:
     def removed() -> set[str]:
         return page.selected & session.removed
 
-    out = quiet_action("Remove and recalibrate", lambda: begin(remove, used), "remove")
-    again = quiet_action("Put back", lambda: begin(put_back, removed), "put-back")
+    with ui.element("div").classes("in-a-row"):
+        out = quiet_action("Remove and recalibrate", lambda: begin(remove, used), "remove")
+        again = quiet_action("Put back", lambda: begin(put_back, removed), "put-back")
     told = ui.label().classes("hint")
 
     def refresh() -> None:

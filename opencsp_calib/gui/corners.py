@@ -22,8 +22,9 @@ def build(page: "Page") -> Callable[[], None]:
         page.show_result("Photographs")
         find_corners(session)
 
-    search = action("Find Corners", find, "find-corners")
-    view = quiet_action("View Found Corners", lambda: page.show_result("Found corners"), "view-corners")
+    with ui.element("div").classes("in-a-row"):
+        search = action("Find Corners", find, "find-corners")
+        view = quiet_action("View Found Corners", lambda: page.show_result("Found corners"), "view-corners")
     stale = ui.label("Board or photographs changed since: find the corners again.").classes("hint")
 
     def refresh() -> None:

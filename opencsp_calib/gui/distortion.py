@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
-from opencsp_calib.report import page as report
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -14,4 +14,10 @@ __all__ = ["build"]
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
-    return of_calibration(page, report.distortion)
+
+    def make(calibration: Calibration) -> str:
+        from opencsp_calib.report.page import distortion
+
+        return distortion(calibration)
+
+    return of_calibration(page, make)

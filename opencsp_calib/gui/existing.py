@@ -14,7 +14,6 @@ from opencsp_calib.gui import existing_actions as actions
 from opencsp_calib.gui.controls import field
 from opencsp_calib.gui.files import shown, within
 from opencsp_calib.judgement import judge
-from opencsp_calib.report.html import table
 from opencsp_calib.summary import parameter_lines
 
 if TYPE_CHECKING:
@@ -75,6 +74,8 @@ def build(page: "Page") -> Callable[[], None]:
 
 def _told(file: CameraFile) -> str:
     """What ``show`` tells."""
+    from opencsp_calib.report.html import table
+
     notes = [note.message for note in file.imported.notes]
     try:
         camera = file.camera

@@ -17,8 +17,6 @@ from opencsp_calib.gui.files import shown, within
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.saving import writable_formats
 from opencsp_calib.models import LENS_MODELS
-from opencsp_calib.report.figures import as_image
-from opencsp_calib.report.plots import difference_plot
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -82,6 +80,9 @@ def _compare(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
     def run() -> None:
+        from opencsp_calib.report.figures import as_image
+        from opencsp_calib.report.plots import difference_plot
+
         if other.value.strip():
             camera = read_camera_file(within(session.folder, other.value)).camera
         elif session.calibration:

@@ -9,7 +9,6 @@ from nicegui.events import EChartPointClickEventArguments
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
-from opencsp_calib.report import page as report
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -29,7 +28,7 @@ def build(page: "Page") -> Callable[[], None]:
     title = ui.html("<h2>Each view, in order of capture</h2>", sanitize=False).classes("report")
     chart = ui.echart({}, on_point_click=clicked).classes("bars").props('role=img aria-label="rms of each view"')
     hint = ui.label("A click on a bar opens its photograph. The dashed line is the rms of all views.").classes("hint")
-    rest = of_calibration(page, report.residuals)
+    rest = of_calibration(page, _residuals)
     shown: list[Any] = [None]
 
     def refresh() -> None:
@@ -44,6 +43,12 @@ def build(page: "Page") -> Callable[[], None]:
         rest()
 
     return refresh
+
+
+def _residuals(calibration: Calibration) -> str:
+    from opencsp_calib.report.page import residuals
+
+    return residuals(calibration)
 
 
 def _bars(calibration: Calibration) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
-from opencsp_calib.report import page as report
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -17,6 +16,8 @@ def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
 
     def make(calibration: Calibration) -> str:
+        from opencsp_calib.report import page as report
+
         before = page.session.before
         return report.summary(calibration) + report.changes(calibration, before) + report.parameters(calibration)
 

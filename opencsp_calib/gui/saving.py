@@ -36,7 +36,6 @@ def build(page: "Page") -> Callable[[], None]:
     kinds = {HDF5: "Camera file (HDF5)", REPORT: "Report (HTML)", **writable_formats()}
     kind = choice("What", kinds, HDF5, lambda _: refresh())
     place = field("Save as", "", lambda _: None, "save-as", "camera.h5")
-    download = ui.checkbox("Download it too", value=True).props("dense")
 
     def suffix() -> str:
         ours = {HDF5: ".h5", REPORT: ".html"}
@@ -59,7 +58,9 @@ def build(page: "Page") -> Callable[[], None]:
         except CalibError as error:
             session.say(str(error), "bad")
 
-    button = action("Save Camera", save, "save-camera")
+    with ui.element("div").classes("in-a-row"):
+        download = ui.checkbox("Download it too", value=True).props("dense")
+        button = action("Save Camera", save, "save-camera")
 
     def refresh() -> None:
         set_prop(place, "placeholder", file_name(session.settings.camera_name, "camera") + suffix())

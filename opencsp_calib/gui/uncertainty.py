@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
-from opencsp_calib.report.trust_section import trust_section
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -14,4 +14,10 @@ __all__ = ["build"]
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
-    return of_calibration(page, trust_section)
+
+    def make(calibration: Calibration) -> str:
+        from opencsp_calib.report.trust_section import trust_section
+
+        return trust_section(calibration)
+
+    return of_calibration(page, make)

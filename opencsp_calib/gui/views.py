@@ -57,7 +57,7 @@ def _rms(session: Session) -> dict[str, float]:
 
 
 def _row(session: Session, image: str, rms: dict[str, float]) -> dict[str, Any]:
-    view = session.views.get(image, {})
+    view, place = session.views.get(image, {}), str(session.selection.path_of(image))
     return {
         "image": image,
         "picture": f"photographs?image={quote(image)}",
@@ -66,7 +66,7 @@ def _row(session: Session, image: str, rms: dict[str, float]) -> dict[str, Any]:
         "tilt": _rounded(view.get("tilt_deg"), 0),
         "edge": _rounded(view.get("edge_width_px"), 2),
         "rms": _rounded(rms.get(image), 4),
-        "problems": "; ".join(problem["message"] for problem in view.get("problems", ())),
+        "problems": "; ".join(problem["message"] for problem in view.get("problems", ())).replace(place, image),
     }
 
 

@@ -35,6 +35,7 @@ def chromium() -> Iterator[Any]:
             "--disable-component-update",
             "--disable-sync",
             "--disable-dev-shm-usage",
+            "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",  # as with the network's cable out
             "--window-size=1280,720",
             f"--user-data-dir={profile}",
         ):
@@ -42,7 +43,7 @@ def chromium() -> Iterator[Any]:
         downloads = Path(profile) / "downloads"
         downloads.mkdir()
         options.add_experimental_option("prefs", {"download.default_directory": str(downloads)})
-        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
         started.downloads = downloads
         started.set_window_size(1280, 720 + 720 - started.execute_script("return innerHeight"))
@@ -50,18 +51,49 @@ def chromium() -> Iterator[Any]:
         started.quit()
 
 
-@pytest.fixture
-def server(tmp_path: Path) -> Iterator[Server]:
-    """The window's server, for an empty folder."""
-    folder = tmp_path / "work"
-    folder.mkdir()
-    with Server(folder) as running:
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory, emulated_cameras: None) -> Iterator[Server]:
+    """One server for all tests that can share it: starting one costs more than most of them."""
+    with Server(tmp_path_factory.mktemp("work")) as running:
         yield running
+    assert (running.more_output, running.errors) == ("", "")
 
 
 @pytest.fixture
-def window(chromium: Any, server: Server) -> Window:
-    """The page of the server, open."""
+def page(chromium: Any, server: Server) -> Iterator[Window]:
+    """The page of that server, as the test before left it."""
     opened = Window(chromium, server)
     opened.open()
-    return opened
+    yield opened
+    opened.leave()
+
+
+@pytest.fixture
+def window(page: Window) -> Window:
+    """The page with no photographs and no results."""
+    page.clear()
+    return page
+
+
+@pytest.fixture
+def small(window: Window, photographs: Path) -> Window:
+    """With photographs of the small world selected."""
+    _select(window, photographs)
+    return window
+
+
+@pytest.fixture
+def calibrated(page: Window, photographs: Path) -> Window:
+    """With a calibration from them; where the test before left one, with that."""
+    if not page.has_result("small", 12):
+        page.clear()
+        _select(page, photographs)
+        page.find_corners()
+        page.calibrate()
+    return page
+
+
+def _select(window: Window, photographs: Path) -> None:
+    window.describe("small", 9, 6, 30)
+    window.select(sorted(photographs.glob("*.png")))
+    window.until(lambda: window.enabled("find-corners"))

@@ -1,42 +1,26 @@
 """The tab Capture in a browser, with Basler's emulated camera: from the live picture straight on to a calibration."""
 
-import os
+import shutil
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from gui_window import Server, Window
-from worlds import SmallWorld
-
-from opencsp_calib.images import write_image
-from opencsp_calib.rendering import render
+from gui_window import Window
 
 pytest.importorskip("pypylon", reason="Basler's SDK is not installed")
-pytestmark = [pytest.mark.timeout(600), pytest.mark.usefixtures("emulated_cameras")]
+pytestmark = pytest.mark.timeout(600)
 
 COPIES = 6  # frames for which a board is held still
-
-
-@pytest.fixture(scope="module")
-def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Photographs of a board that is held still in twelve places, one after the other."""
-    world, folder = SmallWorld.seeded(), tmp_path_factory.mktemp("scene")
-    for place, pose in enumerate(world.poses):
-        for copy in range(COPIES):
-            image = render(world.camera, world.board, pose, rng=place * COPIES + copy, samples=2)
-            write_image(image.pixels, folder / f"{place:02d}_{copy}.png")
-    return folder
+FRAMES_A_SECOND = 3
 
 
 @pytest.fixture
-def window(chromium, tmp_path: Path, monkeypatch) -> Iterator[Window]:
-    monkeypatch.setitem(os.environ, "PYLON_CAMEMU", "1")
-    (tmp_path / "work").mkdir()
-    with Server(tmp_path / "work") as running:
-        opened = Window(chromium, running)
-        opened.open()
-        yield opened
+def scene(photographs: Path, tmp_path: Path) -> Path:
+    """Photographs of a board that is held still in twelve places, one after the other."""
+    for photograph in photographs.glob("*.png"):
+        for copy in range(COPIES):
+            shutil.copyfile(photograph, tmp_path / f"{photograph.stem}_{copy}.png")
+    return tmp_path
 
 
 def open_tab(window: Window) -> None:
@@ -64,7 +48,8 @@ def taken(window: Window) -> int:
 def test_from_the_live_picture_straight_to_a_calibration(window: Window, scene: Path) -> None:
     window.describe("captured", 9, 6, 30)
     open_tab(window)
-    settings = f"ImageFilename={scene}\nImageFileMode=On\nTestImageSelector=Off\nAcquisitionFrameRate=2"
+    settings = f"ImageFilename={scene}\nImageFileMode=On\nTestImageSelector=Off"
+    settings += f"\nAcquisitionFrameRate={FRAMES_A_SECOND}"
     window.element("capture-settings").send_keys(settings)
     window.until(lambda: window.enabled("capture-start"))
     start(window)
@@ -75,11 +60,11 @@ def test_from_the_live_picture_straight_to_a_calibration(window: Window, scene: 
     gauges = window.element("capture-gauges").text
     assert all(name in gauges for name in ("board", "tilt", "still", "sharp", "light", "size", "new"))
     assert window.element("capture-next").text.startswith("Next: ")
-    for _ in range(4):
+    for _ in range(3):
         before = taken(window)
         window.browser.find_element("css selector", "body").send_keys(" ")
         window.until(lambda before=before: taken(window) > before)
-        time.sleep(COPIES / 2)  # the board is elsewhere
+        time.sleep(COPIES / FRAMES_A_SECOND)  # the board is elsewhere
     folder = window.server.folder / "photographs"
     window.click("capture-delete")
     window.until(lambda: "taken" in window.element("capture-message").text)

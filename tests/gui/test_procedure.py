@@ -1,16 +1,28 @@
 """The seed's procedure from the first button to the last, on its own photographs, in a browser."""
 
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from gui_window import Window, run_cli
+from gui_window import Server, Window, run_cli
 
 pytestmark = pytest.mark.timeout(600)
 STEPS = ("find-corners", "view-corners", "calibrate", "reprojection-error", "visualize-distortion", "save-camera")
 BOARD = "checkerboard:18x23:50mm"
+
+
+@pytest.fixture
+def window(chromium: object, tmp_path: Path) -> Iterator[Window]:
+    """The page as it is when it is opened for the first time."""
+    (tmp_path / "work").mkdir()
+    with Server(tmp_path / "work") as server:
+        opened = Window(chromium, server)
+        opened.open()
+        yield opened
+        opened.leave()
 
 
 def content(path: Path) -> dict[str, object]:
