@@ -22,14 +22,14 @@ def run_cli(*arguments: object) -> None:
 class Server:
     """``opencsp-calib gui`` in a process of its own."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, **environment: str) -> None:
         self.folder = folder
+        self._environment = os.environ | {"PYLON_CAMEMU": "1"} | environment  # with Basler's emulated cameras
 
     def __enter__(self) -> "Server":
         command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser"]
-        environment = os.environ | {"PYLON_CAMEMU": "1"}  # Basler's emulated cameras, read when the SDK is loaded
         self.process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self._environment
         )
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"http://127\.0\.0\.1:([0-9]+)/\?token=([\w-]{20,})", self.address)
@@ -139,6 +139,13 @@ class Window:
     @property
     def rms(self) -> str:
         return str(self.element("rms").text)
+
+    def focused(self) -> str:
+        """What has the keyboard: its test id, else its words."""
+        script = (
+            "const e = document.activeElement; return e.dataset.testid || e.innerText || e.getAttribute('aria-label')"
+        )
+        return str(self.browser.execute_script(script)).strip()
 
     def select(self, paths: list[Path]) -> None:
         self.browser.find_element("css selector", "input[type=file]").send_keys("\n".join(map(str, paths)))

@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors process_setting",
-    "arrays atomic opencv blas provenance seal",
+    "arrays atomic opencv blas processes provenance seal",
     "models",
     "camera rotations convex_hull board",
     "pose",

@@ -4,7 +4,8 @@
 
     folder.py     the photographs on disk, each with its record; goes on where it was stopped
     release.py    when the shutter is released: by the coach, by a clock, by hand
-    learner.py    works out in the background what the photographs tell
+    learner.py    has worked out in the background what the photographs tell, by
+    learning.py   in a process of its own
     capture.py    puts these together: frame in, state out; the command line and the GUI show it
     running.py    from what a person asks for to a capture that runs
 """

@@ -1,22 +1,27 @@
-"""Works out in the background what the photographs taken so far tell, while the live picture goes on."""
+"""Has worked out in the background what the photographs taken so far tell, while the live picture goes on.
 
+In a process of its own: its many small steps would take Python's lock from the thread that looks at the frames.
+"""
+
+import pickle
+import subprocess
 from collections.abc import Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 from opencsp_calib.board import Board
 from opencsp_calib.coach import Knowledge, learn
-from opencsp_calib.detection import View
-from opencsp_calib.errors import InputError
-from opencsp_calib.images import ImageFile, read_encoded
-from opencsp_calib.looking import Look, Search
+from opencsp_calib.errors import CalibError
+from opencsp_calib.looking import Search
+from opencsp_calib.processes import own_process
 
 __all__ = ["Learner"]
 
 
 class Learner:
-    """Looks at photographs in full, and learns from all of them; one thread, and always the latest state of the set.
+    """Learns from photographs, always from the latest state of the set; see `learning.Study`.
 
     Parameters
     ----------
@@ -27,14 +32,16 @@ class Learner:
     """
 
     def __init__(self, search: Search, image_size: tuple[int, int], range_m: float | None, goal_px: float) -> None:
-        self._search, self._image_size = search, image_size
-        self._learn = partial(learn, range_m=range_m, goal_px=goal_px)
-        self._views: dict[Path, View] = {}
-        self._pool = ThreadPoolExecutor(1, thread_name_prefix="learn")
+        self._search = search
+        self._process = subprocess.Popen(  # noqa: S603  # our own module
+            own_process("opencsp_calib.capture.learning"), stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        )
+        self._waiting = ThreadPoolExecutor(1, thread_name_prefix="learn")
         self._running: Future[Knowledge] | None = None
         self._wanted: tuple[Path, ...] = ()
         self._started: tuple[Path, ...] = ()
-        self.knowledge = self._learn(self.board, image_size)
+        self.knowledge = learn(search.board, image_size, range_m=range_m, goal_px=goal_px)
+        self._tell((search, image_size, range_m, goal_px))
 
     @property
     def board(self) -> Board:
@@ -60,8 +67,11 @@ class Learner:
         return self.knowledge
 
     def close(self) -> None:
-        """Stop; what is running comes to its end, but is not waited for."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        """Stop, whatever is running."""
+        self._process.kill()
+        self._waiting.shutdown(cancel_futures=True)  # what waits for an answer is told that there is none
+        with suppress(OSError):  # it would still write what the process never read
+            self._process.communicate()
 
     def _advance(self) -> None:
         if self._running is not None and self._running.done():
@@ -69,17 +79,22 @@ class Learner:
             self._running = None
         if self._running is None and self._wanted != self._started:
             self._started = self._wanted
-            self._running = self._pool.submit(self._learned, self._wanted)
+            self._running = self._waiting.submit(self._learned, self._wanted)
 
     def _learned(self, photographs: tuple[Path, ...]) -> Knowledge:
-        self._views = {path: self._views.get(path) or self._view(path) for path in photographs}
-        return self._learn(self.board, self._image_size, tuple(self._views.values()), before=self.knowledge)
-
-    def _view(self, path: Path) -> View:
+        assert self._process.stdout is not None  # noqa: S101  # a pipe was asked for
+        self._tell(photographs)
         try:
-            look = self._search.look(read_encoded(ImageFile(path.name, path)))
-        except InputError as error:
-            look = Look.unreadable(path.name, str(error))
-        if look.size not in (None, self._image_size):
-            return View(path.name, look.view.detection, "wrong size")
-        return look.view
+            answer = pickle.load(self._process.stdout)  # noqa: S301  # our own process
+        except EOFError:
+            raise CalibError("the coach's process ended unexpectedly (out of memory?)") from None
+        if isinstance(answer, Exception):
+            raise answer
+        assert isinstance(answer, Knowledge)  # noqa: S101
+        return answer
+
+    def _tell(self, what: Any) -> None:
+        assert self._process.stdin is not None  # noqa: S101  # a pipe was asked for
+        with suppress(BrokenPipeError):  # it has died: its answer, which is none, says so
+            pickle.dump(what, self._process.stdin)
+            self._process.stdin.flush()

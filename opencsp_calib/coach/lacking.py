@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
@@ -39,7 +40,7 @@ class Lack:
     message : str
         For the person who holds the board.
     helped_by : callable
-        Whether a view of the board in a pose would help: takes camera, board, pose.
+        Whether a view of the board in a pose would help: takes camera, board, pose. It can be sent to another process.
     """
 
     code: str
@@ -75,16 +76,15 @@ def range_of(board: Board, pose: Pose) -> float:
 def _views(count: int) -> Lack | None:
     if count >= FEW_VIEWS:
         return None
-    return Lack("views", f"{FEW_VIEWS - count} more views at least", lambda *_: False)
+    return Lack("views", f"{FEW_VIEWS - count} more views at least", _no_view_by_itself)
 
 
 def _tilt(poses: Sequence[Pose]) -> Lack | None:
-    low, high = TILT_ALLOWED_DEG
-    good = sum(low <= pose.tilt_deg <= high for pose in poses)
+    good = sum(map(_is_tilted_well, poses))
     if poses and good >= len(poses) / 2:
         return None
     message = "tilt the board by 30 to 45 degrees" + (f": {good} of {len(poses)} views have that" if poses else "")
-    return Lack("tilt", message, lambda _, __, pose: low <= pose.tilt_deg <= high)
+    return Lack("tilt", message, _tilts)
 
 
 def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
@@ -96,7 +96,7 @@ def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
     message = f"hold the board {rarer}: {counts['horizontal']} views are horizontal, {counts['vertical']} vertical"
     if not poses:
         message = "half of the views with the board horizontal, half vertical"
-    return Lack("orientation", message, lambda _, board, pose: held(board, pose) == rarer)
+    return Lack("orientation", message, partial(_holds, rarer))
 
 
 def _coverage(observations: Observations) -> Lack | None:
@@ -107,12 +107,8 @@ def _coverage(observations: Observations) -> Lack | None:
     if not missing:
         return None
     names = ", ".join(REGIONS[where] for where in missing) if reached else "all of it"
-
-    def helps(camera: Camera, board: Board, pose: Pose) -> bool:
-        pixels = camera.project(pose.transform(board.points))
-        return not _reached(pixels, camera.image_size).isdisjoint(missing)
-
-    return Lack("coverage", f"bring the board to the parts of the image where none was: {names}", helps)
+    message = f"bring the board to the parts of the image where none was: {names}"
+    return Lack("coverage", message, partial(_reaches, missing))
 
 
 def _reached(pixels: Pixels, image_size: tuple[int, int]) -> set[tuple[int, int]]:
@@ -128,9 +124,31 @@ def _range(board: Board, poses: Sequence[Pose]) -> Lack | None:
         return None
     message = f"go nearer or farther: all views are {min(ranges):.2f} m away" if ranges else "views from two distances"
     middle = float(np.median(ranges)) if ranges else float("nan")
+    return Lack("range", message, partial(_is_elsewhere, middle))
 
-    def helps(_: Camera, board: Board, pose: Pose) -> bool:
-        ratio = range_of(board, pose) / middle
-        return not 1 / NEAR_FAR < ratio < NEAR_FAR
 
-    return Lack("range", message, helps)
+def _no_view_by_itself(_: Camera, __: Board, ___: Pose) -> bool:
+    return False
+
+
+def _is_tilted_well(pose: Pose) -> bool:
+    low, high = TILT_ALLOWED_DEG
+    return low <= pose.tilt_deg <= high
+
+
+def _tilts(_: Camera, __: Board, pose: Pose) -> bool:
+    return _is_tilted_well(pose)
+
+
+def _holds(way: str, _: Camera, board: Board, pose: Pose) -> bool:
+    return held(board, pose) == way
+
+
+def _reaches(regions: Sequence[tuple[int, int]], camera: Camera, board: Board, pose: Pose) -> bool:
+    pixels = camera.project(pose.transform(board.points))
+    return not _reached(pixels, camera.image_size).isdisjoint(regions)
+
+
+def _is_elsewhere(middle_m: float, _: Camera, board: Board, pose: Pose) -> bool:
+    ratio = range_of(board, pose) / middle_m
+    return not 1 / NEAR_FAR < ratio < NEAR_FAR

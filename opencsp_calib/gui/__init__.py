@@ -9,6 +9,6 @@
     page.py      the page; each of its sections is a file of its own
     *.js         the few elements that NiceGUI does not have; style.css, how all of it looks
 
-NiceGUI is imported here and nowhere else (extra ``gui``). The first page is there before what only results need, such as
-the report and its plots, is loaded: that is imported where it is used.
+NiceGUI is imported here and nowhere else (extra ``gui``). The first page is there before what only results need, such
+as the report and its plots, is loaded: that is imported where it is used.
 """

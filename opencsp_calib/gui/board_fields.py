@@ -93,5 +93,8 @@ def _options(fields: SettingFields) -> None:
     fields.option("detector", "Detector", default | _able("detectors"))
     fields.option("refine", "Corners located by", default | located)
     fields.line("guess", "Camera file to start from")
+    fields.line("select", "Keep only so many views, the most telling", "keep-views")
+    fields.line("drop_worst", "Leave out so many of the worst views", "drop-worst")
+    fields.line("max_rms", "Leave out views of more than … px rms", "max-rms")
     fields.line("pixel_pitch_um", "Pixel size in µm")
     fields.text("notes", "Notes, one KEY=VALUE a line")

@@ -2,13 +2,13 @@
 
 import asyncio
 import json
-import sys
 from contextlib import suppress
 from typing import Any
 
 from nicegui import Event
 
 from opencsp_calib.gui.news import Message
+from opencsp_calib.processes import own_process
 
 __all__ = ["SHOWN_PX", "LiveCamera"]
 
@@ -41,9 +41,7 @@ class LiveCamera:
         self._begun, self.frame, self.message = True, None, Message("Starting the camera …")
         self.changed.emit()
         self._process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "opencsp_calib.gui.camera_job",
+            *own_process("opencsp_calib.gui.camera_job"),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             limit=MAX_LINE,

@@ -1,14 +1,24 @@
 // One camera file's way in from the browser's machine.
 export default {
   template: `
-    <label class="drop">
-      <input type="file" class="off-screen" aria-label="Camera file" @change="send" />
-      <span class="hint">choose a camera file of this computer, or name one below</span>
+    <label class="drop" :class="{ over }" @dragover.prevent="over = true" @dragleave="over = false" @drop.prevent="drop">
+      <input type="file" class="off-screen" aria-label="Camera file" @change="pick" />
+      <span class="hint">click to choose a camera file of this computer, drop it here, or name one below</span>
     </label>`,
+  data() {
+    return { over: false };
+  },
   methods: {
-    async send(event) {
+    pick(event) {
       const [file] = event.target.files;
-      event.target.value = "";
+      event.target.value = ""; // so that the same one can be chosen again
+      this.send(file);
+    },
+    drop(event) {
+      this.over = false;
+      this.send(event.dataTransfer.files[0]);
+    },
+    async send(file) {
       if (!file) return;
       const answer = await fetch(`cameras?${new URLSearchParams({ name: file.name })}`, { method: "PUT", body: file });
       this.$emit("received", answer.ok ? (await answer.json()).path : "");

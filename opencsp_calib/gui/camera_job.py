@@ -1,4 +1,4 @@
-"""A capture in a process of its own: ``python -m opencsp_calib.gui.camera_job``, started by `camera.py`.
+"""A capture in a process of its own, started by `camera.py`.
 
 The first line of standard input says, as JSON, what to capture; each further one is ``press``, ``delete`` or ``stop``.
 Each line of standard output is JSON: a frame with all there is to show of it, something said, what came of it at last,
@@ -22,7 +22,7 @@ from opencsp_calib.coach.wording import described
 from opencsp_calib.errors import CalibError
 from opencsp_calib.images import encode_thumbnail
 
-__all__ = ["frame_as_json"]
+__all__ = ["frame_as_json", "main"]
 
 
 def main() -> None:
@@ -80,7 +80,3 @@ def frame_as_json(state: State, shown_px: int) -> dict[str, Any]:
 def _rounded(pixels: Pixels) -> list[list[float]]:
     known = pixels[np.isfinite(pixels).all(axis=1)]
     return [[round(float(x), 1), round(float(y), 1)] for x, y in known]
-
-
-if __name__ == "__main__":
-    main()

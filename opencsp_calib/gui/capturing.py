@@ -20,7 +20,7 @@ __all__ = ["build"]
 
 RELEASES = {"coach": "when the coach finds it right", "manual": "by hand", "interval:2": "every two seconds"}
 MARKS = {"good": "✓", "bad": "✗", "unknown": "?"}
-NOTHING = "data:image/gif;base64,R0lGODlhAQABAIAAAAAAAP///yH5BAEAAAAALAAAAAABAAEAAAIBRAA7"
+NOTHING = "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' width='960' height='720'/>"
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -48,6 +48,10 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
 
     def take(name: str) -> Callable[[str], None]:
         return lambda value: asked.update({name: value})
+
+    def take_source(value: str) -> None:
+        asked["source"] = value
+        refresh()
 
     async def start() -> None:
         try:
@@ -78,8 +82,9 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
 
     ui.keyboard(on_key=on_key)
     with ui.element("section").classes("step"):
-        sources = {name: name for name in sorted(installed().image_sources)}
-        choice("Images from", sources, asked["source"], take("source"))
+        known = installed().image_sources
+        choice("Images from", {name: name for name in sorted(known)}, asked["source"], take_source)
+        lacking = ui.label().classes("hint").props("data-testid=capture-lacking")
         field("Camera (serial number) or folder", "", take("device"), "capture-device", "the first camera")
         field("Photographs go to the folder", asked["folder"], take("folder"), "capture-folder")
         choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
@@ -96,7 +101,10 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
 
     def refresh() -> None:
         begin.set_visibility(not camera.running)
-        begin.set_enabled(page.session.settings.is_complete)
+        missing = known[asked["source"]].missing() if asked["source"] in known else "no installed plugin provides it"
+        lacking.set_text(f"{asked['source']}: {missing}" if missing else "")
+        lacking.set_visibility(missing is not None)
+        begin.set_enabled(page.session.settings.is_complete and missing is None)
         for shown in (end, press, delete, keys):
             shown.set_visibility(camera.running)
         taken = bool(camera.frame and camera.frame["taken"])

@@ -1,4 +1,4 @@
-"""What can be done with an existing camera: check, compare, convert, undistort."""
+"""What can be done with an existing camera: check, compare, convert, undistort, solve again."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
 from opencsp_calib.gui.controls import choice, field, quiet_action
 from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.kept import take_up
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.saving import writable_formats
 from opencsp_calib.models import LENS_MODELS
@@ -137,6 +138,24 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
     return _needs_file(quiet_action("Convert", run, "convert-camera"), chosen)
 
 
+def _solve_again(page: "Page", chosen: Chosen) -> Refresh:
+    session = page.session
+
+    def run() -> None:
+        if chosen.path is not None:
+            take_up(session, chosen.path)
+            page.show_tab("Calibrate")
+
+    ui.html("<h2>Solve again</h2>", sanitize=False)
+    ui.label("Takes the corners kept in the file to Calibrate, to be solved in another way.").classes("hint")
+    button = quiet_action("Solve again", lambda: page.attempt(run), "solve-again")
+
+    def refresh() -> None:
+        button.set_enabled(chosen.file is not None and chosen.file.calibration is not None and not session.busy)
+
+    return refresh
+
+
 def _undistort(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
@@ -164,4 +183,4 @@ def _needs_file(button: ui.button, chosen: Chosen) -> Refresh:
     return refresh
 
 
-ACTIONS = (_check, _compare, _convert, _undistort)
+ACTIONS = (_check, _compare, _convert, _undistort, _solve_again)

@@ -1,4 +1,4 @@
-"""The long work itself, in a process of its own: ``python -m opencsp_calib.gui.jobs``, started by `work.py`.
+"""The long work itself, in a process of its own, started by `work.py`.
 
 Each line of standard input is a job as JSON, each line of standard output an answer. It ends with its standard input,
 so that it never outlives the window, however that ended.
@@ -83,9 +83,17 @@ def find_corners(
 
 
 def solve(
-    tell: Tell, observations: str, exclude: list[str], options: dict[str, Any], guess: str, calibration: str
+    tell: Tell,
+    observations: str,
+    exclude: list[str],
+    options: dict[str, Any],
+    guess: str,
+    calibration: str,
+    select: int = 0,
+    drop_worst: int = 0,
+    max_rms: float | None = None,
 ) -> None:
-    """Solve for the camera, without the images to be excluded; writes a camera file."""
+    """Solve for the camera, without the images to be excluded or left out; writes a camera file."""
     from opencsp_calib import dropping, pipeline
     from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.hdf5_calibration import load_observations, save_calibration
@@ -93,7 +101,14 @@ def solve(
     if guess:
         options["guess"] = read_camera_file(guess).camera
     observed = dropping.excluding(load_observations(observations), exclude)
-    save_calibration(pipeline.solve(observed, **options), calibration)
+    if select:
+        observed = pipeline.select(observed, select, **options).observations
+    result = pipeline.solve(observed, **options)
+    if drop_worst:
+        result = dropping.drop_worst(result, drop_worst, lambda views: pipeline.solve(views, **options))
+    if max_rms is not None:
+        result = dropping.drop_above(result, max_rms, lambda views: pipeline.solve(views, **options))
+    save_calibration(result, calibration)
 
 
 def validate(tell: Tell, calibration: str, sections: str) -> str:
@@ -154,9 +169,40 @@ def undistort(tell: Tell, camera: str, images: list[str], folder: str) -> None:
     undistort_images(read_camera_file(camera).camera, find_images(images), Path(folder), progress)
 
 
-JOBS: dict[str, Callable[..., Any]] = {
-    job.__name__: job for job in (find_corners, solve, validate, report, check, undistort)
-}
+def fleet(tell: Tell, where: str, given: dict[str, str]) -> dict[str, Any]:
+    """Calibrate many cameras, by a folder of folders or a file; the settings given hold where there is no file.
 
-if __name__ == "__main__":
-    main()
+    A run that was stopped goes on where it was.
+    """
+    from pathlib import Path
+
+    from opencsp_calib.detection import View
+    from opencsp_calib.fleet import CAMERA_FILE, FleetResult, calibrate_camera
+    from opencsp_calib.fleet_file import FILE_NAME, find_fleet
+    from opencsp_calib.journal import Journal, journal_beside
+    from opencsp_calib.report import write_fleet, write_report
+
+    path = Path(where)
+    cameras = find_fleet(path, {} if path.is_file() or (path / FILE_NAME).is_file() else given)
+    root = cameras[0].root
+    journals = [Journal(journal_beside(root / camera.name / CAMERA_FILE)) for camera in cameras]
+
+    def calibrated(number: int) -> FleetResult:
+        camera = cameras[number]
+        what = f"Calibrating {camera.name} ({number + 1} of {len(cameras)})"
+
+        def progress(done: int, total: int, _: View) -> None:
+            tell({"what": what, "done_images": done, "total": total})
+
+        return calibrate_camera(camera, root / camera.name, write_report, progress=progress, journal=journals[number])
+
+    results = [calibrated(number) for number in range(len(cameras))]
+    write_fleet(results, root.absolute().name, root / "fleet.html")
+    for journal in journals:
+        journal.remove()
+    return {"cameras": [result.as_json() for result in results], "report": str(root / "fleet.html")}
+
+
+JOBS: dict[str, Callable[..., Any]] = {
+    job.__name__: job for job in (find_corners, solve, validate, report, check, undistort, fleet)
+}

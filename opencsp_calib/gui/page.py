@@ -14,6 +14,7 @@ from nicegui import ui
 
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui import (
+    about,
     board_fields,
     board_shape,
     calibrating,
@@ -22,6 +23,7 @@ from opencsp_calib.gui import (
     cross_validation,
     distortion,
     existing,
+    fleets,
     photographs,
     poses,
     printing,
@@ -61,7 +63,9 @@ RESULTS: tuple[tuple[str, Build], ...] = (
 TABS: tuple[tuple[str, Build], ...] = (
     ("Capture", capturing.build),
     ("Existing camera", existing.build),
+    ("Many cameras", fleets.build),
     ("Print a board", printing.build),
+    ("About", about.build),
 )
 BEFORE_CALIBRATION = ("Photographs", "Found corners")
 

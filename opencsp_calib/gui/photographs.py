@@ -8,6 +8,8 @@ from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
 from opencsp_calib.gui.controls import action, field
+from opencsp_calib.gui.files import within
+from opencsp_calib.gui.kept import is_kept, take_up
 from opencsp_calib.gui.session import Session
 
 if TYPE_CHECKING:
@@ -61,8 +63,9 @@ def build(page: "Page") -> Callable[[], None]:
     def refresh() -> None:
         chosen = session.selection
         received = [f"{done} of {total} received" for done, total in chosen.receiving.values()]
-        count.set_text("; ".join(received) or f"{len(chosen.files)} photographs")
-        clear.set_enabled(bool(chosen.files) and not session.busy and not chosen.receiving)
+        kept = f"corners from {session.kept}" if session.kept and not chosen.files else ""
+        count.set_text("; ".join(received) or kept or f"{len(chosen.files)} photographs")
+        clear.set_enabled(bool(chosen.files or kept) and not session.busy and not chosen.receiving)
         select.set_enabled(not session.busy)
 
     return refresh
@@ -70,6 +73,10 @@ def build(page: "Page") -> Callable[[], None]:
 
 def _folder_field(page: "Page") -> None:
     def take() -> None:
+        path = within(page.session.folder, folder.value)
+        if is_kept(path):
+            take_up(page.session, path)
+            return
         source, found = page.session.selection.add(folder.value or ".")
         page.session.say(f"{found} photographs in {source}.")
 
@@ -77,5 +84,6 @@ def _folder_field(page: "Page") -> None:
         page.attempt(take)
 
     with ui.element("div").classes("with-button"):
-        folder = field("or a folder here", "", lambda _: None, "photograph-folder").on("keydown.enter", use)
+        folder = field("or a folder here", "", lambda _: None, "photograph-folder", "or a file of corners")
+        folder.on("keydown.enter", use)
         ui.button("Use", on_click=use).props("no-caps flat dense")

@@ -77,7 +77,7 @@ async def _save(session: Session, board: Board, path: Path) -> None:
     write_board(board, _drawing(board), path)
     place = shown(session.folder, path)
     session.say(f"Board saved: {place}. Print it at 100 %, and measure its bar.", "good")
-    ui.download.from_url(f"files?path={quote(place)}")
+    ui.download.from_url(f"/files?path={quote(place)}")
 
 
 def _drawing(board: Board) -> Drawing:

@@ -81,6 +81,7 @@ async def _calibrate(session: Session) -> None:
         options=settings.solving | options,
         guess=settings.guess and str(within(session.folder, settings.guess)),
         calibration=str(new),
+        **settings.leaving_out,
     )
     if target.exists():
         target.replace(session.file("before"))

@@ -54,7 +54,7 @@ def build(page: "Page") -> Callable[[], None]:
             if not await may_write(path):
                 return
             if await session.start(f"Saving {path.name}", partial(_save, session, kind.value, path)) and download.value:
-                ui.download.from_url(f"files?path={quote(shown(session.folder, path))}")
+                ui.download.from_url(f"/files?path={quote(shown(session.folder, path))}")
         except CalibError as error:
             session.say(str(error), "bad")
 

@@ -1,5 +1,6 @@
 """Starting the window: a socket on this machine, a token, one address."""
 
+import logging
 import secrets
 import socket
 import sys
@@ -54,6 +55,7 @@ def serve(folder: Path, host: str, port: int, *, open_browser: bool) -> None:
     names = (host, socket.gethostname(), socket.getfqdn()) if open_to_all else ()
     guarded = Guard(_application(session, opened), token, names, any_address=open_to_all)
     server = uvicorn.Server(uvicorn.Config(guarded, log_level="error", access_log=False, ws_max_size=2**24))
+    logging.getLogger("nicegui").setLevel(logging.ERROR)  # else each address that is not there is told, with the token
     sys.stdout.write(address + "\n")
     sys.stdout.flush()
     with suppress(KeyboardInterrupt):  # the usual end

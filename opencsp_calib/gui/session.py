@@ -63,6 +63,7 @@ class Session:
         self.camera = LiveCamera()
         self.settings = Settings()
         self.selection = Selection(self.folder, self.own / "photographs")
+        self.kept = ""  # the file that corners were taken up from, in the place of photographs
         self.views: dict[str, dict[str, Any]] = {}  # by image, as `summary.view_as_json`
         self.found_with: list[Any] = []
         self.observations: Observations | None = None
@@ -114,7 +115,7 @@ class Session:
 
     def forget_photographs(self) -> None:
         """Start again with none, and with no results."""
-        self.views, self.removed, self.found_with = {}, frozenset(), []
+        self.views, self.removed, self.found_with, self.kept = {}, frozenset(), [], ""
         self.observations = self.calibration = self.before = None
         for name in ("observations.hdf5", "calibration.hdf5", "before.hdf5", "found.journal"):
             (self.own / name).unlink(missing_ok=True)
@@ -150,6 +151,7 @@ class Session:
             "version": VERSION,
             "settings": self.settings.as_json(),
             "sources": self.selection.sources,
+            "kept": self.kept,
             "found_with": self.found_with,
             "removed": sorted(self.removed),
         }
@@ -192,10 +194,15 @@ class Session:
             if "view" in answer:
                 self.views[answer["view"]["image"]] = answer["view"]
             if "total" in answer and self.progress:
-                self.progress = replace(self.progress, done=answer["done_images"], total=answer["total"])
+                self._advance(answer.get("what", self.progress.what), answer["done_images"], answer["total"])
                 self.tell_soon()
             result = answer.get("done")
         return result
+
+    def _advance(self, what: str, done: int, total: int) -> None:
+        if self.progress is None or what != self.progress.what:
+            self.progress = Progress(what)  # its time left is counted anew
+        self.progress = replace(self.progress, done=done, total=total)
 
     async def _run(self, what: str, work: Callable[[], Coroutine[Any, Any, None]], total: int) -> bool:
         if self.busy:
@@ -218,6 +225,8 @@ class Session:
 
     def asked(self) -> list[Any]:
         """What decides what is found."""
+        if self.kept and not self.selection.files:
+            return [self.kept]
         return [self.settings.spec, self.settings.finding, [str(file.path) for file in self.selection.files]]
 
     def describe_views(self) -> None:
@@ -243,6 +252,7 @@ class Session:
             content = json.loads(path.read_text(encoding="utf-8"))
             self.settings = Settings.from_json(content["settings"])
             self.selection.sources = tuple(str(source) for source in content["sources"])
+            self.kept = str(content.get("kept", ""))
             self.found_with = content["found_with"]
             self.removed = frozenset(str(name) for name in content["removed"])
             wrong = self.selection.look_up()

@@ -34,6 +34,8 @@ class Settings:
         In one line, of any other kind.
     model, solver, board_shape, pixel_aspect, weights, robust, guess, detector, refine, preset, notes
         As the options of ``calibrate``.
+    select, drop_worst, max_rms : str
+        As those too: which views to leave out for what they are like.
     """
 
     camera_name: str = ""
@@ -56,6 +58,9 @@ class Settings:
     detector: str = ""
     refine: str = ""
     preset: str = ""
+    select: str = ""
+    drop_worst: str = ""
+    max_rms: str = ""
     pixel_pitch_um: str = ""
     notes: str = ""
 
@@ -124,6 +129,21 @@ class Settings:
         if self.robust:
             asked["robust"] = self.robust == "yes"
         return asked
+
+    @property
+    def leaving_out(self) -> dict[str, Any]:
+        """Which views to leave out for what they are like.
+
+        Raises
+        ------
+        InputError
+            If it is not told by numbers.
+        """
+        asked = (("select", int), ("drop_worst", int), ("max_rms", float))
+        try:
+            return {key: kind(getattr(self, key)) for key, kind in asked if getattr(self, key).strip()}
+        except ValueError as error:
+            raise InputError(f"which views are left out is told by numbers: {error}") from None
 
     @property
     def record(self) -> dict[str, str]:

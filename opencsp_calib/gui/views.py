@@ -40,9 +40,9 @@ def build(page: "Page") -> Callable[[], None]:
     empty = ui.label(START).classes("quiet empty")
 
     def refresh() -> None:
-        names = [file.name for file in session.selection.files]
-        rms = _rms(session)
-        fill(page, table, [_row(session, name, rms) for name in names])
+        names = [file.name for file in session.selection.files] or list(session.views)
+        rms, dropped = _rms(session), _dropped(session)
+        fill(page, table, [_row(session, name, rms, dropped) for name in names])
         table.set_visibility(bool(names))
         empty.set_visibility(not names)
 
@@ -56,17 +56,26 @@ def _rms(session: Session) -> dict[str, float]:
     return {view.image: float(rms) for view, rms in zip(solved.observations.used, solved.view_rms_px, strict=True)}
 
 
-def _row(session: Session, image: str, rms: dict[str, float]) -> dict[str, Any]:
+def _dropped(session: Session) -> dict[str, str]:
+    """Photographs that the calibration was solved without, and why."""
+    solved = session.calibration
+    views = solved.observations.views if solved else ()
+    return {view.image: view.problems[-1].message for view in views if view.status == "dropped" and view.problems}
+
+
+def _row(session: Session, image: str, rms: dict[str, float], dropped: dict[str, str]) -> dict[str, Any]:
     view, place = session.views.get(image, {}), str(session.selection.path_of(image))
+    told = [problem["message"] for problem in view.get("problems", ())]
+    told += [dropped[image]] if image in dropped else []
     return {
         "image": image,
         "picture": f"photographs?image={quote(image)}",
-        "status": "left out" if image in session.removed else view.get("status", ""),
+        "status": "left out" if image in session.removed or image in dropped else view.get("status", ""),
         "corners": view.get("corners"),
         "tilt": _rounded(view.get("tilt_deg"), 0),
         "edge": _rounded(view.get("edge_width_px"), 2),
         "rms": _rounded(rms.get(image), 4),
-        "problems": "; ".join(problem["message"] for problem in view.get("problems", ())).replace(place, image),
+        "problems": "; ".join(told).replace(place, image),
     }
 
 

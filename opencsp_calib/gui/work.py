@@ -6,12 +6,12 @@ second; what it is asked and what it answers are lines of JSON; large results ar
 
 import asyncio
 import json
-import sys
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from typing import Any, cast
 
 from opencsp_calib.errors import CalibError, CalibrationFailedError, CancelledError, InputError
+from opencsp_calib.processes import own_process
 
 __all__ = ["Worker"]
 
@@ -29,9 +29,7 @@ class Worker:
         """Have the process ready."""
         if self._process is None or self._process.returncode is not None:
             self._process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                "opencsp_calib.gui.jobs",
+                *own_process("opencsp_calib.gui.jobs"),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=MAX_LINE,
