@@ -150,6 +150,14 @@ class Window:
     def select(self, paths: list[Path]) -> None:
         self.browser.find_element("css selector", "input[type=file]").send_keys("\n".join(map(str, paths)))
 
+    def drop(self, paths: list[Path], place: str) -> None:
+        """Let files go over an element, as if dragged from the desktop."""
+        box = self.browser.find_element("css selector", place).rect
+        event = {"x": box["x"] + box["width"] / 2, "y": box["y"] + box["height"] / 2}
+        event["data"] = {"items": [], "files": [str(path) for path in paths], "dragOperationsMask": 1}
+        for kind in ("dragEnter", "dragOver", "drop"):
+            self.browser.execute_cdp_cmd("Input.dispatchDragEvent", {"type": kind, **event})
+
     def describe(self, name: str, columns: int, rows: int, square_mm: float) -> None:
         for testid, value in (("camera-name", name), ("grid-x", columns), ("grid-y", rows), ("square-size", square_mm)):
             self.type(testid, str(value))

@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 from gui_window import Server, Window, run_cli
 
 from opencsp_calib.demo import make_demo
-from opencsp_calib.pipeline import usable_cores
+from opencsp_calib.detecting import usable_cores
 
 BOARD = "checkerboard:21x18:50mm"
 

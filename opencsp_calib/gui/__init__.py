@@ -4,6 +4,7 @@
 
     server.py    starts: socket, token, address          guard.py   who may ask at all
     session.py   what has been chosen and found so far, kept in a folder in DIR
+    offered.py   what plugins offer here
     work.py      hands long work to jobs.py, which runs in a process of its own
     files.py     which files may be touched             routes.py  photographs in, thumbnails and results out
     page.py      the page; each of its sections is a file of its own

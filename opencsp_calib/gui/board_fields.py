@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from opencsp_calib.errors import InputError
-from opencsp_calib.gui.controls import set_prop
+from opencsp_calib.gui.controls import offer, set_prop
 from opencsp_calib.gui.setting_fields import SettingFields
 from opencsp_calib.gui.settings import BY_FIELDS, Settings
 from opencsp_calib.models import LENS_MODELS
@@ -20,6 +20,7 @@ __all__ = ["build"]
 DICTIONARIES = [f"DICT_{size}X{size}_{count}" for size in (4, 5, 6, 7) for count in (50, 100, 250, 1000)]
 DICTIONARIES += ["DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h11"]
 COUNTED = {"charuco": ("Squares x", "Squares y")}
+DEFAULT = {"": "default"}
 GRID_POINTS = ("Grid points x", "Grid points y")
 
 
@@ -43,14 +44,17 @@ def build(page: "Page") -> Callable[[], None]:
     with ui.element("div").classes("side-by-side"):
         solved_by = [
             fields.option("model", "Lens model", {name: name for name in LENS_MODELS}),
-            fields.option("solver", "Solver", _able("solvers")),
+            fields.option("solver", "Solver", {}),
         ]
     with ui.expansion("More options").classes("more").props("dense"):
-        _options(fields)
+        detector = _options(fields)
 
     def refresh() -> None:
         fields.refresh()
         now = session.settings
+        if session.offered:
+            offer(solved_by[1], session.offered.solvers)
+            offer(detector, DEFAULT | session.offered.detectors)
         for element, kinds in ((grid, BY_FIELDS), (square, BY_FIELDS), (markers, ("charuco",))):
             element.set_visibility(now.board_kind in kinds)
         described.set_visibility(now.board_kind not in BY_FIELDS)
@@ -76,25 +80,20 @@ def _said(now: Settings) -> str:
     return ""
 
 
-def _able(kind: str) -> dict[str, str]:
-    """What is installed of a kind, and can run here."""
-    provided = sorted(getattr(installed(), kind).items())
-    return {name: name for name, one in provided if one.missing() is None}
-
-
-def _options(fields: SettingFields) -> None:
-    default = {"": "default"}
+def _options(fields: SettingFields) -> ui.select:
+    """What is seldom changed; gives the choice of detectors."""
     located = {"none": "as found", "subpix": "OpenCV's search", "model": "a fit of the corner's image"}
     fields.option("preset", "Preset", {"": "none", "opencsp": "exactly as OpenCSP"})
     fields.option("board_shape", "Board shape", {name: name for name in ("auto", "flat", "warp", "free")})
-    fields.line("pixel_aspect", "Pixel aspect: free, square, or fy/fx", hint="free")
-    fields.option("weights", "Weights", default | {"equal": "equal", "covariance": "by covariance"})
-    fields.option("robust", "Leave out outlying corners", default | {"yes": "yes", "no": "no"})
-    fields.option("detector", "Detector", default | _able("detectors"))
-    fields.option("refine", "Corners located by", default | located)
+    fields.line("pixel_aspect", "Pixel aspect", hint="free, square, or fy/fx")
+    fields.option("weights", "Weights", DEFAULT | {"equal": "equal", "covariance": "by covariance"})
+    fields.option("robust", "Leave out outlying corners", DEFAULT | {"yes": "yes", "no": "no"})
+    detector = fields.option("detector", "Detector", DEFAULT)
+    fields.option("refine", "Corners located by", DEFAULT | located)
     fields.line("guess", "Camera file to start from")
-    fields.line("select", "Keep only so many views, the most telling", "keep-views")
-    fields.line("drop_worst", "Leave out so many of the worst views", "drop-worst")
-    fields.line("max_rms", "Leave out views of more than … px rms", "max-rms")
+    fields.line("select", "Keep the N most telling views", "keep-views")
+    fields.line("drop_worst", "Leave out the N worst views", "drop-worst")
+    fields.line("max_rms", "Leave out views above rms (px)", "max-rms")
     fields.line("pixel_pitch_um", "Pixel size in µm")
     fields.text("notes", "Notes, one KEY=VALUE a line")
+    return detector

@@ -16,6 +16,9 @@ SHOWN_PX = 960
 """The longer side of the live picture."""
 
 MAX_LINE = 2**26  # bytes of one frame
+NEXT = (
+    "Calibrate these; then take a second set into another folder, and check the camera with it under Existing camera."
+)
 
 
 class LiveCamera:
@@ -75,7 +78,7 @@ class LiveCamera:
             elif "say" in answer:
                 self.message = Message(answer["say"])
             elif "done" in answer:
-                ended = Message(f"{answer['done']} photographs are taken.", "good")
+                ended = Message(f"{answer['done']} photographs are taken. {NEXT}", "good")
             else:
                 ended = Message(answer["error"], "bad")
             self.changed.emit()

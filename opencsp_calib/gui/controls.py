@@ -5,7 +5,7 @@ from typing import Any
 
 from nicegui import ui
 
-__all__ = ["action", "choice", "field", "quiet_action", "set_prop"]
+__all__ = ["action", "choice", "field", "offer", "quiet_action", "set_prop"]
 
 
 def action(label: str, on_click: Callable[[], Any], testid: str = "") -> ui.button:
@@ -32,9 +32,18 @@ def field(label: str, value: str, on_change: Callable[[str], Any], testid: str =
 
 def choice(label: str, options: Mapping[str, str], value: str, on_change: Callable[[str], Any]) -> ui.select:
     """One of several."""
-    known = dict(options) if value in options else {**options, value: value}
-    made = ui.select(known, label=label, value=value, on_change=lambda event: on_change(event.value))
+    made = ui.select(_with(options, value), label=label, value=value, on_change=lambda event: on_change(event.value))
     return made.props("outlined dense options-dense").classes("field")
+
+
+def offer(made: ui.select, options: Mapping[str, str]) -> None:
+    """Have a choice offer these; what is chosen stays."""
+    if _with(options, made.value) != made.options:
+        made.set_options(_with(options, made.value))
+
+
+def _with(options: Mapping[str, str], value: str) -> dict[str, str]:
+    return dict(options) if value in options else {**options, value: value}
 
 
 def set_prop(element: ui.element, name: str, value: Any) -> None:

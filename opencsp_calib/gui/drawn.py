@@ -10,7 +10,7 @@ from nicegui import background_tasks, ui
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
-__all__ = ["drawn", "of_calibration"]
+__all__ = ["DRAWING", "drawn", "of_calibration"]
 
 DRAWING = ThreadPoolExecutor(1, thread_name_prefix="drawing")
 """One at a time, because matplotlib's settings are global."""

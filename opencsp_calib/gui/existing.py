@@ -35,7 +35,7 @@ def build(page: "Page") -> Callable[[], None]:
             ui.html("<h2>Existing camera</h2>", sanitize=False)
             entry = CameraInput()
             place = field("Camera file", "", lambda _: None, "camera-file", "camera.h5")
-            with ui.expansion("Where the file does not tell").props("dense"):
+            with ui.expansion("Where the file does not tell").props("dense").classes("more") as more:
                 name = field("Which of several cameras", "", lambda _: None)
                 size = field("Image size, such as 1626x1236", "", lambda _: None)
                 form = field("Format", "", lambda _: None)
@@ -56,7 +56,12 @@ def build(page: "Page") -> Callable[[], None]:
         session.say(f"{shown(session.folder, path)} is open.")
 
     def opened() -> None:
+        chosen.file = None
         page.attempt(read)
+        if chosen.file is None:
+            told.set_content("")
+            more.open()  # most often it is a name or a size that is asked for
+            page.refresh()
 
     def received(event: GenericEventArguments) -> None:
         place.set_value(event.args)

@@ -1,5 +1,6 @@
 """What can be done with an existing camera: check, compare, convert, undistort, solve again."""
 
+import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
@@ -8,15 +9,16 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from opencsp_calib.camera import Camera
 from opencsp_calib.camera_files import CameraFile, convert, read_camera_file, write_camera_file
 from opencsp_calib.comparison import compare
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
-from opencsp_calib.gui.controls import choice, field, quiet_action
+from opencsp_calib.gui.controls import choice, field, offer, quiet_action
+from opencsp_calib.gui.drawn import DRAWING
 from opencsp_calib.gui.files import shown, within
 from opencsp_calib.gui.kept import take_up
 from opencsp_calib.gui.news import Message
-from opencsp_calib.gui.saving import writable_formats
 from opencsp_calib.models import LENS_MODELS
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = ["ACTIONS", "Chosen"]
 
+FORMATS = {"": "by the name's ending", "opencsp": "OpenCSP (HDF5)"}
 LEVELS = {"ok": "good", "degraded": "doubt", "wrong": "bad"}
 
 
@@ -80,33 +83,40 @@ def _check(page: "Page", chosen: Chosen) -> Refresh:
 def _compare(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
-    def run() -> None:
+    def compared(other_camera: Camera, range_m: float | None) -> str:
         from opencsp_calib.report.figures import as_image
         from opencsp_calib.report.plots import difference_plot
 
-        if other.value.strip():
-            camera = read_camera_file(within(session.folder, other.value)).camera
-        elif session.calibration:
-            camera = session.calibration.camera
-        else:
-            raise InputError("name another camera file, or calibrate first")
-        try:
-            range_m = float(distance.value) if distance.value.strip() else None
-        except ValueError:
-            raise InputError(f"the range is a number of metres, not {distance.value!r}") from None
-        found = compare(chosen.opened.camera, camera, range_m=range_m)
+        found = compare(chosen.opened.camera, other_camera, range_m=range_m)
         where = "at infinity" if range_m is None else f"at {range_m:g} m"
         sentence = (
             f"{where}: rms {found.rms_px:.4g} px, median {found.median_px:.4g} px, worst {found.worst_px:.4g} px over "
             f"the image, after a turn of the frame by {found.rotation_deg:.4g} degrees"
         )
-        chosen.tell(f"<h2>Compared</h2><p>{escape(sentence)}</p>" + as_image(difference_plot(found), sentence))
-        session.say("Compared.", "good")
+        return f"<h2>Compared</h2><p>{escape(sentence)}</p>" + as_image(difference_plot(found), sentence)
+
+    async def run() -> None:
+        try:
+            if other.value.strip():
+                camera = read_camera_file(within(session.folder, other.value)).camera
+            elif session.calibration:
+                camera = session.calibration.camera
+            else:
+                raise InputError("name another camera file, or calibrate first")
+            range_m = float(distance.value) if distance.value.strip() else None
+            told = await asyncio.get_running_loop().run_in_executor(DRAWING, compared, camera, range_m)
+        except ValueError:
+            session.say(f"The range is a number of metres, not {distance.value!r}.", "bad")
+        except CalibError as error:
+            session.say(str(error), "bad")
+        else:
+            chosen.tell(told)
+            session.say("Compared.", "good")
 
     ui.html("<h2>Compare</h2>", sanitize=False)
-    other = field("With another file; empty: with the result here", "", lambda _: None)
+    other = field("Other file; empty: the result here", "", lambda _: None, "compare-with")
     distance = field("Range in m; empty: at infinity", "", lambda _: None)
-    return _needs_file(quiet_action("Compare", lambda: page.attempt(run), "compare-cameras"), chosen)
+    return _needs_file(quiet_action("Compare", run, "compare-cameras"), chosen)
 
 
 def _convert(page: "Page", chosen: Chosen) -> Refresh:
@@ -118,7 +128,7 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
             if path.is_dir():
                 raise InputError("name the file to write")
             accepted = float(accept.value) if accept.value.strip() else None
-            made = convert(chosen.opened, fit.value or None, accepted)
+            made = await asyncio.to_thread(convert, chosen.opened, fit.value or None, accepted)
             if await may_write(path):
                 write_camera_file(made.camera, path, form.value or None, made.record)
                 said = f" ({made.record['import fit']})" if made.fit else ""
@@ -129,13 +139,18 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
             session.say(str(error), "bad")
 
     ui.html("<h2>Convert</h2>", sanitize=False)
-    form = choice(
-        "Format", {"": "by the name's ending", "opencsp": "OpenCSP (HDF5)", **writable_formats()}, "", lambda _: None
-    )
+    form = choice("Format", FORMATS, "", lambda _: None)
     fit = choice("Lens model", {"": "exactly as it is", **{m: f"fit {m}" for m in LENS_MODELS}}, "", lambda _: None)
     accept = field("Accepted error of a fit in px", "", lambda _: None, hint="0.1")
     place = field("Save as", "", lambda _: None, "convert-to", "camera.yaml")
-    return _needs_file(quiet_action("Convert", run, "convert-camera"), chosen)
+    enable = _needs_file(quiet_action("Convert", run, "convert-camera"), chosen)
+
+    def refresh() -> None:
+        if session.offered:
+            offer(form, FORMATS | session.offered.formats)
+        enable()
+
+    return refresh
 
 
 def _solve_again(page: "Page", chosen: Chosen) -> Refresh:

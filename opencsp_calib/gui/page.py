@@ -159,14 +159,17 @@ class Page:
 def show(session: Session) -> None:
     """Build the page for one more tab of a browser."""
     ui.colors(primary="#0b6e99", positive="#1c7c4a", negative="#b3261e", warning="#9a6200")
-    style = files("opencsp_calib.gui").joinpath("style.css").read_text(encoding="utf-8")
-    report = files("opencsp_calib.report").joinpath("style.css").read_text(encoding="utf-8")
-    ui.add_css(f".report {{ {report} }} {style}")
+    ui.add_css(f".report {{ {_style('report')} }} {_style('gui')}")
     ui.add_body_html("<script>history.replaceState(null, '', location.pathname + location.hash)</script>")
     page = Page(session)
     page.build()
     page.refresh()
     session.changed.subscribe(page.refresh)
+    ui.context.client.on_connect(session.ask_plugins)  # then the page is there
+
+
+def _style(package: str) -> str:
+    return files("opencsp_calib").joinpath(package, "style.css").read_text(encoding="utf-8")
 
 
 def _theme_button() -> None:

@@ -13,7 +13,7 @@ from opencsp_calib.atomic import check_writable
 from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
-from opencsp_calib.gui.controls import action, choice, field, set_prop
+from opencsp_calib.gui.controls import action, choice, field, offer, set_prop
 from opencsp_calib.gui.files import file_name, shown, within
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.session import Session
@@ -23,18 +23,16 @@ from opencsp_calib.registry import installed
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
-__all__ = ["build", "writable_formats"]
+__all__ = ["build"]
 
 HDF5, REPORT = "hdf5", "report"
-OURS = "opencsp"
-"""The format that is offered as HDF5, with the calibration in it."""
+KINDS = {HDF5: "Camera file (HDF5)", REPORT: "Report (HTML)"}
 
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    kinds = {HDF5: "Camera file (HDF5)", REPORT: "Report (HTML)", **writable_formats()}
-    kind = choice("What", kinds, HDF5, lambda _: refresh())
+    kind = choice("What", KINDS, HDF5, lambda _: refresh())
     place = field("Save as", "", lambda _: None, "save-as", "camera.h5")
 
     def suffix() -> str:
@@ -63,16 +61,12 @@ def build(page: "Page") -> Callable[[], None]:
         button = action("Save Camera", save, "save-camera")
 
     def refresh() -> None:
+        if session.offered:
+            offer(kind, KINDS | session.offered.formats)
         set_prop(place, "placeholder", file_name(session.settings.camera_name, "camera") + suffix())
         button.set_enabled(session.calibration is not None and not session.busy)
 
     return refresh
-
-
-def writable_formats() -> dict[str, str]:
-    """Other programs' formats that can be written here, by name, as people know them."""
-    known = sorted(installed().camera_formats.items())
-    return {name: f.title for name, f in known if f.writes and f.missing() is None and name != OURS}
 
 
 async def _save(session: Session, kind: str, path: Path) -> None:

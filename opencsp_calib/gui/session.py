@@ -32,6 +32,7 @@ from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.camera import LiveCamera
 from opencsp_calib.gui.files import shown
 from opencsp_calib.gui.news import Level, Message, Progress
+from opencsp_calib.gui.offered import Offered
 from opencsp_calib.gui.selection import Selection
 from opencsp_calib.gui.settings import Settings
 from opencsp_calib.gui.work import Worker
@@ -61,6 +62,7 @@ class Session:
         self.changed: Event[[]] = Event()
         self.worker = Worker()
         self.camera = LiveCamera()
+        self.offered: Offered | None = None
         self.settings = Settings()
         self.selection = Selection(self.folder, self.own / "photographs")
         self.kept = ""  # the file that corners were taken up from, in the place of photographs
@@ -130,6 +132,12 @@ class Session:
     def cancel(self) -> None:
         """Stop the work that goes on."""
         self.worker.stop()
+
+    async def ask_plugins(self) -> None:
+        """Find out what they offer, if it is not known yet."""
+        if self.offered is None:
+            self.offered = await asyncio.to_thread(Offered.here)
+            self.changed.emit()
 
     # --- telling and keeping ---
 

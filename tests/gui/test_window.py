@@ -12,6 +12,7 @@ from gui_window import Server, Window, run_cli
 from worlds import SmallWorld
 
 from opencsp_calib import Camera
+from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.images import write_image
 
 pytestmark = pytest.mark.timeout(300)
@@ -120,7 +121,7 @@ def test_no_board_anywhere_and_a_board_that_is_none(window: Window, tmp_path: Pa
     for index in range(3):
         write_image(np.full((240, 320), 60 + index, np.uint8), tmp_path / f"{index}.png")
     window.describe("camera", 9, 6, 30)
-    window.select(sorted(tmp_path.glob("*.png")))
+    window.drop([tmp_path], ".step .drop")
     window.until(lambda: window.enabled("find-corners"))
     window.type("grid-x", "2")
     window.until(lambda: not window.enabled("find-corners"))
@@ -234,7 +235,7 @@ def test_put_back_is_as_before(calibrated: Window) -> None:
     assert calibrated.rms == rms
 
 
-def test_an_existing_camera(small: Window, small_world: SmallWorld) -> None:
+def test_an_existing_camera(small: Window, small_world: SmallWorld, tmp_path: Path) -> None:
     small_world.camera.save(small.server.folder / "truth.h5")
     small.tab("Existing camera")
     small.type("camera-file", "../truth.h5")
@@ -243,6 +244,12 @@ def test_an_existing_camera(small: Window, small_world: SmallWorld) -> None:
     small.type("camera-file", "truth.h5")
     small.click("open-camera")
     small.until(lambda: small.text_is_there("800.000 px"))
+    write_camera_file(small_world.camera, tmp_path / "from-elsewhere.yaml")
+    small.drop([tmp_path / "from-elsewhere.yaml"], ".narrow .drop")
+    small.until(lambda: small.status == "opencsp-calib-session/cameras/from-elsewhere.yaml is open.")
+    small.type("compare-with", "truth.h5")
+    small.click("compare-cameras")
+    small.until(lambda: small.text_is_there("at infinity: rms 0 px"))
     small.click("check-camera")
     small.until(lambda: small.status == "Checked: small: ok")
     small.picture("existing-camera")
@@ -333,8 +340,8 @@ def test_the_keyboard_alone_will_do(calibrated: Window) -> None:
     wanted = "camera-name grid-x grid-y square-size select-images find-corners view-corners calibrate"
     wanted += " reprojection-error visualize-distortion save-camera"
     assert [name for name in order if name in wanted.split()] == wanted.split()
-    shown = "return getComputedStyle(document.activeElement).outlineStyle"
-    assert calibrated.browser.execute_script(shown) == "solid"
+    around = "return getComputedStyle(document.activeElement).boxShadow"
+    assert calibrated.browser.execute_script(around) != "none"
     calibrated.browser.execute_script("document.querySelector('[data-testid=visualize-distortion]').focus()")
     ActionChains(calibrated.browser).send_keys(" ").perform()
     calibrated.until(lambda: calibrated.find_all("img[alt='size of the distortion']"))
