@@ -169,7 +169,7 @@ def show(session: Session) -> None:
 
 
 def _style(package: str) -> str:
-    return files("opencsp_calib").joinpath(package, "style.css").read_text(encoding="utf-8")
+    return (files("opencsp_calib") / package / "style.css").read_text(encoding="utf-8")
 
 
 def _theme_button() -> None:
