@@ -76,12 +76,7 @@ def remaining_sigmas(calibration: Calibration) -> float:
 
 
 def _remaining(equations: NormalEquations, factor: Factorisation, noise_px: float) -> float:
-    gradients = (
-        equations.shared_gradient.sum(axis=0)[:, None],
-        equations.corner_gradient.sum(axis=0)[:, :, None],
-        equations.pose_gradient[:, :, None],
-    )
-    step = factor.solve(*gradients)[0][:, 0]
+    step = factor.solve(equations.gradient)[0]
     variance = max(equations.cost / max(equations.dof, 1), noise_px**2)
     return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
 

@@ -11,6 +11,7 @@ from opencsp_calib.options import Weights
 
 __all__ = ["CornerTable"]
 
+LEAST = 40  # corners of a view: enough for its pose, whatever is wrong with a few of them
 CHUNK = 4096  # corners linearised at once: their Jacobians stay in the processor's cache
 
 
@@ -69,6 +70,19 @@ class CornerTable:
         whitening = None if self.whitening is None else self.whitening[mask]
         return CornerTable(self.ids[mask], self.pixels[mask], first, whitening)
 
+    def thinned(self, count: int) -> "CornerTable":
+        """About as many corners, some of every view: the same share of each, but at least `LEAST` where it has them.
+
+        Drawn at random, but always the same: every n-th could be all on one line.
+        """
+        if len(self) <= count:
+            return self
+        wanted = np.maximum(LEAST, count / len(self) * self.counts)
+        order = np.lexsort([np.random.default_rng(len(self)).random(len(self)), self.view])
+        mask = np.empty(len(self), dtype=np.bool_)
+        mask[order] = np.arange(len(self)) - self.first[self.view] < wanted[self.view]
+        return self.keeping(mask)
+
     def weighted(self, factor: Floats) -> "CornerTable":
         """The same with each corner's whitened residual multiplied by a factor (N,)."""
         whitening = np.eye(2) if self.whitening is None else self.whitening
@@ -78,12 +92,17 @@ class CornerTable:
         """A mask (N,) as one of each view."""
         return tuple(np.split(mask, self.first[1:-1]))
 
-    def chunks(self) -> Iterator[tuple[int, int]]:
+    def span(self, begin: int, end: int, *, since: int = 0) -> slice:
+        """Where the corners of a run of views are, counted from those of the view `since`."""
+        offset = self.first[since]
+        return slice(int(self.first[begin] - offset), int(self.first[end] - offset))
+
+    def chunks(self, begin: int = 0, last: int | None = None) -> Iterator[tuple[int, int]]:
         """First view and end of runs of views with about `CHUNK` corners, or one view where that has more."""
-        begin, views = 0, len(self.first) - 1
-        while begin < views:
+        last = len(self.first) - 1 if last is None else last
+        while begin < last:
             end = max(begin + 1, int(np.searchsorted(self.first, self.first[begin] + CHUNK, side="right")) - 1)
-            yield begin, end
+            yield begin, min(end, last)
             begin = end
 
 

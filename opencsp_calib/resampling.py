@@ -193,12 +193,7 @@ def _part(calibration: Calibration, observations: Observations) -> Calibration:
 def _stepped(calibration: Calibration) -> Camera:
     """The camera one Newton step nearer to what a calibration's views ask for, poses and board moving with it."""
     equations = normal_equations(calibration)
-    gradients = (
-        equations.shared_gradient.sum(axis=0)[:, None],
-        equations.corner_gradient.sum(axis=0)[:, :, None],
-        equations.pose_gradient[:, :, None],
-    )
-    shared = factorise(equations).solve(*gradients)[0][:, 0]
+    shared = factorise(equations).solve(equations.gradient)[0]
     basis = equations.unknowns.camera
     camera = calibration.camera
     return replace(camera, params=camera.params - basis @ shared[: basis.shape[1]])

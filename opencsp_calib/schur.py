@@ -1,76 +1,76 @@
-"""Normal equations taken apart by Schur complements: steps, covariances, and every view left out in turn.
+"""Normal equations taken apart by Schur complements: steps and covariances.
 
 Poses touch each other only through the camera and the board, and corners only through the camera and the poses. So
 the more numerous of the two kinds is eliminated block by block, and what remains is a dense matrix of the other kind
 and of the shared unknowns, with these last: the tail of its Cholesky factor then is that of the shared unknowns' own
 information, everything else marginalised. Source: Triggs and others, "Bundle adjustment: a modern synthesis", 2000.
 
-Where corners are solved for, the seven steps of `NormalEquations.corner_gauge` change nothing that is observed. They
-are held at zero by adding their projector, which moves no observable quantity by any amount: no corner and no pose is
-held, since more than seven conditions bias the answer.
+Where corners are solved for, the seven steps of `NormalEquations.gauge` change nothing that is observed. They are held
+at zero by adding their projector, which moves no observable quantity by any amount: no corner and no pose is held,
+since more than seven conditions bias the answer.
+
+With more views than corners nothing is kept whose size grows with both: what ties the poses to the corners is made
+again, view after view, where it is needed.
 """
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
-from opencsp_calib.normal_equations import NormalEquations
+from opencsp_calib.jacobian import CORNER, POSE
+from opencsp_calib.normal_equations import NormalEquations, Parts
 from opencsp_calib.triangular import CholeskyRoot
 
-__all__ = ["Factorisation", "camera_covariance", "camera_without_each_view", "factorise"]
+__all__ = ["Factorisation", "camera_covariance", "factorise"]
 
-CG_TOLERANCE = 1e-8  # of the step's length, in sigmas
-CG_STEPS = 200
+TOGETHER = 32  # views whose poses are eliminated at once: matrices large enough for BLAS
 
 
 @dataclass(frozen=True, eq=False)
-class Factorisation:
+class Factorisation(ABC):
     """A factored normal matrix, ready to solve with.
 
     Parameters
     ----------
-    poses_kept : bool
-        Whether the corners were eliminated, and the poses are in the dense factor; otherwise the other way round.
+    equations : NormalEquations
     inverse_roots : (D, d, d)
         Inverses of the Cholesky factors of the D eliminated blocks.
-    coupling : (D, d, kept + M)
-        What ties the eliminated blocks to the rest, multiplied by the inverse roots.
-    scale : (kept + M,)
+    scale : (n,)
         One over the root of the dense matrix's diagonal.
     root : CholeskyRoot
-        Of the scaled dense matrix (kept + M, kept + M): of what was kept, then of the M shared unknowns.
-    shared : int
-        M.
+        Of the scaled dense matrix (n, n): of what was kept, then of the M shared unknowns.
     """
 
-    poses_kept: bool
+    equations: NormalEquations
     inverse_roots: Floats
-    coupling: Floats
     scale: Floats
     root: CholeskyRoot
-    shared: int
 
     @property
     def shared_covariance(self) -> Matrix:
         """(M, M) inverse of the shared unknowns' information; multiply by s² for their covariance."""
-        tail = self.root.lower[-self.shared :, -self.shared :]
-        half = np.linalg.inv(tail) * self.scale[-self.shared :]
+        shared = self.equations.unknowns.shared
+        half = np.linalg.inv(self.root.lower[-shared:, -shared:]) * self.scale[-shared:]
         return np.asarray(half.T @ half)
 
-    def solve(self, shared: Floats, corner: Floats, pose: Floats) -> tuple[Floats, Floats, Floats]:
-        """Solutions for right-hand sides (M, R), (C, 3, R) and (V, 6, R), in the same shapes."""
-        kept, dropped = (pose, corner) if self.poses_kept else (corner, pose)
-        columns = shared.shape[1]
-        inner = self.inverse_roots @ dropped
-        right = np.concatenate([kept.reshape(-1, columns), shared])
-        right = right - _flat(self.coupling).T @ inner.reshape(-1, columns)
-        dense = self.scale[:, None] * self.root.solve(self.scale[:, None] * right)
-        inner = inner - (_flat(self.coupling) @ dense).reshape(inner.shape)
-        dropped = self.inverse_roots.transpose(0, 2, 1) @ inner
-        kept = dense[: len(dense) - self.shared].reshape(kept.shape)
-        shared = dense[len(dense) - self.shared :]
-        return (shared, dropped, kept) if self.poses_kept else (shared, kept, dropped)
+    @abstractmethod
+    def solve(self, right: Parts) -> Parts:
+        """The solution for a right-hand side."""
+
+    @abstractmethod
+    def solve_without_poses(self, right: Floats) -> Floats:
+        """Solutions (M + 3 C, R) for right-hand sides from which the poses are eliminated.
+
+        By [shared | x of the corners | y of the corners | z of the corners].
+        """
+
+    def _dense(self, right: Floats) -> Floats:
+        """Solutions with the dense matrix, (n,) or (n, R)."""
+        scale = self.scale.reshape(-1, *[1] * (right.ndim - 1))
+        return np.asarray(scale * self.root.solve(scale * right))
 
 
 def factorise(equations: NormalEquations, damping: float = 0.0) -> Factorisation:
@@ -81,26 +81,9 @@ def factorise(equations: NormalEquations, damping: float = 0.0) -> Factorisation
     numpy.linalg.LinAlgError
         If it is singular to working precision, or has NaN.
     """
-    views, corners = equations.corner.shape[:2]
-    poses_kept = 6 * views < 3 * corners
-    by_corner = equations.by_corner[..., : 3 + equations.unknowns.shared].sum(axis=0)
-    corner, corner_shared = by_corner[..., :3], by_corner[..., 3:]
-    pose, pose_shared = equations.pose, equations.shared_pose.transpose(0, 2, 1)
-    if poses_kept:
-        kept, kept_shared, gauge = pose, pose_shared, equations.pose_gauge
-        dropped, dropped_shared = corner, corner_shared
-        cross = equations.corner_pose.transpose(1, 2, 0, 3)
-    else:
-        kept, kept_shared, gauge = corner, corner_shared, equations.corner_gauge
-        dropped, dropped_shared = pose, pose_shared
-        cross = equations.corner_pose.transpose(0, 3, 1, 2)
-    inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(dropped, damping)))
-    cross = np.concatenate([cross.reshape(*dropped.shape[:2], len(kept) * kept.shape[1]), dropped_shared], axis=2)
-    coupling = inverse_roots @ cross
-    shared = _damped(equations.shared.sum(axis=0), damping)
-    reduced = _assembled(_damped(kept, damping), kept_shared, shared) - _flat(coupling).T @ _flat(coupling)
-    scale, root = _scaled_root(reduced, gauge.reshape(-1, gauge.shape[2]))
-    return Factorisation(poses_kept, inverse_roots, coupling, scale, root, len(shared))
+    views, corners = len(equations.pose), len(equations.corner)
+    kind = PosesKept if POSE * views < CORNER * corners else CornersKept
+    return kind.of(equations, damping)
 
 
 def camera_covariance(equations: NormalEquations) -> Matrix:
@@ -116,129 +99,134 @@ def camera_covariance(equations: NormalEquations) -> Matrix:
     return np.asarray(basis @ factorise(equations).shared_covariance[:cameras, :cameras] @ basis.T)
 
 
-def camera_without_each_view(equations: NormalEquations) -> Floats:
-    """How the camera's parameters move when each view in turn is left out: one Newton step, everything solved again.
+@dataclass(frozen=True, eq=False)
+class PosesKept(Factorisation):
+    """Corners eliminated one by one: for more corners than views.
 
-    Where the board's shape is free, all left-out views are solved for at once by conjugate gradients that start from
-    the factor of the whole: one view of many changes little, so few steps are needed.
-
-    Returns
-    -------
-    (V, P)
-        Parameters without the view minus those with it; NaN where the others do not determine them.
+    Parameters
+    ----------
+    coupling : (3, 6 V + M, C)
+        What ties the rest to the corners, multiplied by the corners' inverse roots.
     """
-    cameras = equations.unknowns.camera.shape[1]
-    steps = _without_by_iteration(equations) if len(equations.unknowns.corners) else _without_directly(equations)
-    return np.asarray(steps[:, :cameras] @ equations.unknowns.camera.T)
+
+    coupling: Floats
+
+    @classmethod
+    def of(cls, equations: NormalEquations, damping: float) -> "PosesKept":
+        """See `factorise`."""
+        inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(equations.corner, damping)))
+        poses = equations.pose_gradient.size
+        coupling = np.zeros((CORNER, poses + equations.unknowns.shared, len(inverse_roots)))
+        by_root = np.ascontiguousarray(inverse_roots.transpose(1, 2, 0))
+        for rows in equations.rows():
+            corner = np.einsum("ikn,akn->ain", by_root[:, :, rows.columns], rows.corner)
+            of_view = slice(POSE * rows.view, POSE * rows.view + POSE)
+            coupling[:, of_view, rows.columns] = np.einsum("ain,apn->ipn", corner, rows.pose)
+        coupling[:, poses:] = np.einsum("ikn,kmn->imn", by_root, equations.by_corner[:, CORNER:-1])
+        ties = equations.shared_pose.transpose(0, 2, 1).reshape(poses, -1)
+        shared = _damped(equations.shared.sum(axis=0), damping)
+        reduced = np.block([[_block_diagonal(_damped(equations.pose, damping)), ties], [ties.T, shared]])
+        reduced -= sum(part @ part.T for part in coupling)
+        return cls(equations, inverse_roots, *_scaled_root(reduced, equations.gauge()[1].reshape(poses, -1)), coupling)
+
+    def solve(self, right: Parts) -> Parts:
+        """See `Factorisation.solve`."""
+        shared, corner, pose = right
+        dense, inner = self._solved(np.concatenate([pose.ravel(), shared]), corner.T)
+        poses = pose.size
+        return dense[poses:], inner.T, dense[:poses].reshape(pose.shape)
+
+    def solve_without_poses(self, right: Floats) -> Floats:
+        """See `Factorisation.solve_without_poses`."""
+        shared, columns = self.equations.unknowns.shared, right.shape[1]
+        poses = np.zeros((self.equations.pose_gradient.size, columns))
+        corners = right[shared:].reshape(CORNER, -1, columns)
+        dense, inner = self._solved(np.concatenate([poses, right[:shared]]), corners)
+        return np.concatenate([dense[len(poses) :], inner.reshape(-1, columns)])
+
+    def _solved(self, kept: Floats, corner: Floats) -> tuple[Floats, Floats]:
+        """Of the poses and shared unknowns (6 V + M, ...), and of the corners (3, C, ...)."""
+        inner = np.einsum("cik,kc...->ic...", self.inverse_roots, corner)
+        dense = self._dense(kept - sum(part @ column for part, column in zip(self.coupling, inner, strict=True)))
+        inner -= [part.T @ dense for part in self.coupling]
+        return dense, np.einsum("cik,ic...->kc...", self.inverse_roots, inner)
 
 
-def _without_directly(equations: NormalEquations) -> Floats:
-    """(V, M): with a small dense matrix for each view."""
-    solved = np.linalg.solve(
-        equations.pose,
-        np.concatenate([equations.shared_pose.transpose(0, 2, 1), equations.pose_gradient[..., None]], axis=2),
-    )
-    information = equations.shared - equations.shared_pose @ solved[..., :-1]
-    gradient = equations.shared_gradient - (equations.shared_pose @ solved[..., -1:])[..., 0]
-    rest, rest_gradient = information.sum(axis=0) - information, gradient.sum(axis=0) - gradient
-    steps = np.full(gradient.shape, np.nan)
-    for view, (matrix, right) in enumerate(zip(rest, rest_gradient, strict=True)):
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        try:
-            root = CholeskyRoot.of(scale[:, None] * matrix * scale)
-        except np.linalg.LinAlgError:
-            continue  # stays NaN: the other views leave something open
-        steps[view] = -scale * root.solve((scale * right)[:, None])[:, 0]
-    return steps
+@dataclass(frozen=True, eq=False)
+class CornersKept(Factorisation):
+    """Poses eliminated one by one: where the board is flat, or there are more views than corners."""
+
+    @classmethod
+    def of(cls, equations: NormalEquations, damping: float) -> "CornersKept":
+        """See `factorise`."""
+        inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(equations.pose, damping)))
+        corners = CORNER * len(equations.corner)
+        ties = equations.by_corner[:, CORNER:-1].transpose(0, 2, 1).reshape(corners, equations.unknowns.shared)
+        shared = _damped(equations.shared.sum(axis=0), damping)
+        reduced = np.block([[_by_coordinates(_damped(equations.corner, damping)), ties], [ties.T, shared]])
+        for coupling in _couplings(equations, inverse_roots):
+            reduced -= coupling.T @ coupling
+        gauge = equations.gauge()[0].transpose(1, 0, 2).reshape(corners, 7)
+        return cls(equations, inverse_roots, *_scaled_root(reduced, gauge))
+
+    def solve(self, right: Parts) -> Parts:
+        """See `Factorisation.solve`."""
+        shared, corner, pose = right
+        equations, corners = self.equations, corner.T.copy()
+        alone = self._poses(pose)
+        for rows in equations.rows():
+            corners[:, rows.columns] -= (rows.corner * (alone[rows.view] @ rows.pose)[:, None]).sum(axis=0)
+        shared = shared - (equations.shared_pose @ alone[:, :, None]).sum(axis=0)[:, 0]
+        dense = self._dense(np.concatenate([corners.ravel(), shared]))
+        corners, shared = dense[: corner.size].reshape(corners.shape), dense[corner.size :]
+        pose = pose - shared @ equations.shared_pose
+        for rows in equations.rows():
+            moved = (rows.corner * corners[:, rows.columns]).sum(axis=1)
+            pose[rows.view] -= (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
+        return shared, corners.T, self._poses(pose)
+
+    def solve_without_poses(self, right: Floats) -> Floats:
+        """See `Factorisation.solve_without_poses`."""
+        shared = self.equations.unknowns.shared
+        return np.roll(self._dense(np.roll(right, -shared, axis=0)), shared, axis=0)
+
+    def _poses(self, right: Floats) -> Floats:
+        """(V, 6) solutions with the poses' own blocks alone."""
+        roots = self.inverse_roots
+        return np.asarray((roots.transpose(0, 2, 1) @ (roots @ right[:, :, None]))[:, :, 0])
 
 
-def _without_by_iteration(equations: NormalEquations) -> Floats:
-    """(V, M): preconditioned conjugate gradients on S - S_v, S being factored and S_v of one view, poses eliminated.
-
-    The product of S with the search direction follows from the recurrence, so S itself is never needed. Both are
-    singular in the directions of the gauge, which right-hand sides have no part in.
-    """
-    shared = equations.shared.shape[1]
-    whole = factorise(equations)
-    inverse_pose = np.asarray(np.linalg.inv(equations.pose), dtype=np.float64)
-    right = _view_gradient(equations, inverse_pose)
-    x, residual = np.zeros_like(right), right.copy()
-    direction, whole_direction = np.zeros_like(right), np.zeros_like(right)
-    before = np.ones(len(right))
-    for step in range(CG_STEPS):
-        preconditioned = _whole_inverse(whole, residual, shared)
-        now = np.einsum("vi,vi->v", residual, preconditioned)
-        if step == 0:
-            start = now.copy()
-        active = now > CG_TOLERANCE**2 * start
-        if not active.any():
-            break
-        factor = np.where(active, now / before, 0.0) if step else np.zeros_like(now)
-        direction = preconditioned + factor[:, None] * direction
-        whole_direction = residual + factor[:, None] * whole_direction
-        product = whole_direction - _view_product(equations, inverse_pose, direction)
-        curvature = np.einsum("vi,vi->v", direction, product)
-        length = np.divide(now, curvature, out=np.zeros_like(now), where=active & (curvature > 0))
-        x += length[:, None] * direction
-        residual -= length[:, None] * product
-        before = np.where(active, now, 1.0)
-    x[active] = np.nan
-    return x[:, :shared]
-
-
-def _view_gradient(equations: NormalEquations, inverse_pose: Floats) -> Floats:
-    """(V, M + 3 C): each view's own gradient by the shared unknowns and the corners, its pose eliminated."""
-    views = len(equations.pose)
-    gradient = np.concatenate([equations.shared_gradient, equations.corner_gradient.reshape(views, -1)], axis=1)
-    return gradient - _from_pose(equations, inverse_pose @ equations.pose_gradient[..., None])
-
-
-def _view_product(equations: NormalEquations, inverse_pose: Floats, x: Floats) -> Floats:
-    """(V, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own."""
-    views, shared = len(x), equations.shared.shape[1]
-    ours, corners = x[:, :shared, None], x[:, shared:].reshape(views, -1, 3, 1)
-    by_corner = equations.by_corner.reshape(views, -1, shared + 10)
-    from_corners = by_corner.transpose(0, 2, 1) @ x[:, shared:, None]
-    pose = equations.shared_pose.transpose(0, 2, 1) @ ours + from_corners[:, 3 + shared : -1]
-    of_shared = equations.shared @ ours + from_corners[:, 3 : 3 + shared]
-    of_corners = (equations.corner @ corners).reshape(views, -1) + (by_corner[..., 3 : 3 + shared] @ ours)[..., 0]
-    return np.concatenate([of_shared[..., 0], of_corners], axis=1) - _from_pose(equations, inverse_pose @ pose)
-
-
-def _from_pose(equations: NormalEquations, pose: Floats) -> Floats:
-    """(V, M + 3 C): the blocks that tie each view's pose to the rest, times (V, 6, 1)."""
-    of_corners = equations.corner_pose.reshape(len(pose), -1, 6) @ pose
-    return np.concatenate([equations.shared_pose @ pose, of_corners], axis=1)[..., 0]
-
-
-def _whole_inverse(whole: Factorisation, vectors: Floats, shared: int) -> Floats:
-    """(V, M + 3 C): the whole's inverse, poses eliminated, times a vector for each view."""
-    views = len(vectors)
-    solved = whole.solve(
-        vectors[:, :shared].T, vectors[:, shared:].T.reshape(-1, 3, views), np.zeros((views, 6, views))
-    )
-    return np.concatenate([solved[0].T, solved[1].reshape(-1, views).T], axis=1)
-
-
-def _flat(blocks: Floats) -> Floats:
-    return blocks.reshape(-1, blocks.shape[2])
+def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[Matrix]:
+    """(6 n, 3 C + M) what ties n poses to corners and shared unknowns, multiplied by the poses' inverse roots."""
+    views, corners = len(inverse_roots), len(equations.corner)
+    for begin in range(0, views, TOGETHER):
+        end = min(begin + TOGETHER, views)
+        ties = np.zeros((end - begin, POSE, CORNER, corners))
+        for rows in equations.rows(begin, end):
+            ties[rows.view - begin][:, :, rows.columns] = rows.corner_pose().transpose(1, 0, 2)
+        shared = equations.shared_pose[begin:end].transpose(0, 2, 1)
+        coupling = inverse_roots[begin:end] @ np.concatenate([ties.reshape(len(shared), POSE, CORNER * corners), shared], axis=2)
+        yield coupling.reshape(-1, coupling.shape[2])
 
 
 def _damped(blocks: Floats, damping: float) -> Floats:
     return blocks * (1.0 + damping * np.eye(blocks.shape[-1]))
 
 
-def _assembled(blocks: Floats, cross: Floats, shared: Floats) -> Matrix:
-    """The dense matrix of kept blocks (n, d, d), what ties them to the shared unknowns (n, d, M), and these (M, M)."""
+def _block_diagonal(blocks: Floats) -> Matrix:
+    """(n d, n d) of blocks (n, d, d)."""
     count, size = blocks.shape[:2]
-    end = count * size
-    dense = np.zeros((end + len(shared), end + len(shared)))
-    index = np.arange(end).reshape(count, size)
-    dense[index[:, :, None], index[:, None, :]] = blocks
-    dense[:end, end:] = cross.reshape(end, len(shared))
-    dense[end:, :end] = dense[:end, end:].T
-    dense[end:, end:] = shared
-    return dense
+    matrix = np.zeros((count, size, count, size))
+    matrix[np.arange(count), :, np.arange(count)] = blocks
+    return matrix.reshape(count * size, count * size)
+
+
+def _by_coordinates(blocks: Floats) -> Matrix:
+    """(3 C, 3 C) of the corners' blocks (C, 3, 3): x of all corners, then y, then z."""
+    every = np.arange(len(blocks))
+    matrix = np.zeros((CORNER, len(blocks), CORNER, len(blocks)))
+    matrix[:, every, :, every] = blocks
+    return matrix.reshape(CORNER * len(blocks), CORNER * len(blocks))
 
 
 def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:

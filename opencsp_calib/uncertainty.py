@@ -25,9 +25,10 @@ from opencsp_calib.arrays import Floats, Matrix, Params
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import CalibrationFailedError
+from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
-from opencsp_calib.schur import camera_covariance, camera_without_each_view
+from opencsp_calib.schur import camera_covariance
 
 __all__ = [
     "Influence",

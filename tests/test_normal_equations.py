@@ -11,11 +11,13 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.detection import Detection, Observations
+from opencsp_calib.jacobian import residuals
+from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.models import LENS_MODELS
-from opencsp_calib.normal_equations import NormalEquations, linearise, normal_equations, residuals, solvable_corners
+from opencsp_calib.normal_equations import NormalEquations, linearise, normal_equations, solvable_corners
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.schur import camera_covariance, camera_without_each_view, factorise
+from opencsp_calib.schur import CornersKept, PosesKept, camera_covariance, factorise
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses
 from opencsp_calib.triangular import CholeskyRoot
 from opencsp_calib.unknowns import Estimate, Unknowns, warp_basis
@@ -81,19 +83,21 @@ class Dense:
         m, end = self.parts
         views, matrix = len(equations.pose), np.zeros((end + 6 * len(equations.pose),) * 2)
         matrix[:m, :m] = equations.shared.sum(axis=0)
-        matrix[m:end, :m] = equations.corner_shared.sum(axis=0).reshape(end - m, m)
-        for k, block in enumerate(equations.corner.sum(axis=0)):
+        matrix[m:end, :m] = equations.corner_shared.reshape(end - m, m)
+        for k, block in enumerate(equations.corner):
             matrix[m + 3 * k : m + 3 * k + 3, m + 3 * k : m + 3 * k + 3] = block
         for v in range(views):
             rows = slice(end + 6 * v, end + 6 * v + 6)
             matrix[rows, :m] = equations.shared_pose[v].T
-            matrix[rows, m:end] = equations.corner_pose[v].reshape(end - m, 6).T
             matrix[rows, rows] = equations.pose[v]
+        for rows in equations.rows():
+            columns = m + 3 * np.arange((end - m) // 3)[rows.columns][:, None] + np.arange(3)
+            poses = end + 6 * rows.view + np.arange(6)
+            matrix[poses[:, None, None], columns] = rows.corner_pose().transpose(1, 2, 0)
         return np.tril(matrix) + np.tril(matrix, -1).T
 
     def gradient(self, equations: NormalEquations) -> np.ndarray:
-        parts = equations.shared_gradient.sum(axis=0), equations.corner_gradient.sum(axis=0), equations.pose_gradient
-        return np.concatenate([part.ravel() for part in parts])
+        return np.concatenate([part.ravel() for part in equations.gradient])
 
 
 def scaled_pinv(matrix: np.ndarray) -> np.ndarray:
@@ -110,9 +114,8 @@ def at_minimum(dense: Dense) -> NormalEquations:
     estimate = Estimate.of(c)
     for _ in range(8):
         equations = linearise(c.camera.lens, table, estimate, unknowns)
-        right = equations.shared_gradient.sum(axis=0), equations.corner_gradient.sum(axis=0), equations.pose_gradient
-        step = factorise(equations).solve(*(-part[..., None] for part in right))
-        estimate = estimate.moved(unknowns, *(part[..., 0] for part in step))
+        step = factorise(equations).solve(equations.gradient)
+        estimate = estimate.moved(unknowns, *(-part for part in step))
     return linearise(c.camera.lens, table, estimate, unknowns)
 
 
@@ -150,9 +153,9 @@ def test_solution_and_covariance_are_those_of_the_dense_pseudo_inverse(shape, as
     matrix, right = dense.matrix(dense.equations), dense.gradient(dense.equations)
     m, end = dense.parts
     factor = factorise(dense.equations)
-    assert factor.poses_kept == (shape == "free" and views == 5)
-    parts = right[:m, None], right[m:end].reshape(-1, 3, 1), right[end:].reshape(-1, 6, 1)
-    solution = np.concatenate([part.ravel() for part in factor.solve(*parts)])
+    assert isinstance(factor, PosesKept if shape == "free" and views == 5 else CornersKept)
+    parts = right[:m], right[m:end].reshape(-1, 3), right[end:].reshape(-1, 6)
+    solution = np.concatenate([part.ravel() for part in factor.solve(parts)])
     scale = np.sqrt(np.diag(matrix))
     assert np.abs((matrix @ solution - right) / scale).max() < 1e-9 * np.abs(right / scale).max()
     basis = dense.unknowns.camera
@@ -171,12 +174,10 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
     found = camera_without_each_view(equations)
     for view, step in enumerate(found):
         rest = np.arange(len(found)) != view
-        without = replace(
-            equations,
-            dense=equations.dense[rest],
-            by_corner=equations.by_corner[rest],
-            pose_gauge=equations.pose_gauge[rest],
-        )
+        table, estimate = equations.table, equations.estimate
+        part = Estimate(estimate.params, estimate.rotations[rest], estimate.translations[rest], estimate.points)
+        seen = [Detection(table.ids[s], table.pixels[s]) for v in np.flatnonzero(rest) for s in [table.span(v, v + 1)]]
+        without = linearise(equations.lens, CornerTable.of(seen), part, equations.unknowns)
         expected = basis @ (-scaled_pinv(dense.matrix(without)) @ dense.gradient(without))[: basis.shape[1]]
         assert np.abs((step - expected) / sigma).max() < 1e-5
 
@@ -185,7 +186,7 @@ def test_gauge_steps_change_nothing_that_is_seen():
     dense = Dense(world(4, SolveOptions(board_shape="free")))
     e = dense.equations
     gauge = np.concatenate(
-        [np.zeros((e.unknowns.shared, 7)), e.corner_gauge.reshape(-1, 7), e.pose_gauge.reshape(-1, 7)]
+        [np.zeros((e.unknowns.shared, 7)), *(part.reshape(-1, 7) for part in e.gauge())]
     )
     assert np.linalg.matrix_rank(gauge) == 7
     scale = np.sqrt(np.diag(dense.matrix(e)))

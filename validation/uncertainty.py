@@ -29,10 +29,11 @@ from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions,
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.comparison import pixel_grid
 from opencsp_calib.flatness import flatness_of_solved
+from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, sigma_map, sigma_over_range
 from opencsp_calib.resampling import compare_halves, leaving_each_out
-from opencsp_calib.schur import camera_covariance, camera_without_each_view
+from opencsp_calib.schur import camera_covariance
 from opencsp_calib.synthetic import demo_camera, observe, seed_poses
 from opencsp_calib.uncertainty import (
     honest_covariance,

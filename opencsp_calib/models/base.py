@@ -62,10 +62,14 @@ class LensModel(ABC):
             Derivative with respect to the point.
         by_params : (N, 2, P)
             Derivative with respect to the parameters.
+
+        Notes
+        -----
+        In memory the points come last: one number of all points side by side is what NumPy is quick at.
         """
         plane, by_point, by_distortion = self._distorted_with_jacobians(points, params[4:])
         pixels = plane * params[:2] + params[2:4]
-        by_params = np.zeros((len(points), 2, len(params)))
+        by_params = np.zeros((2, len(params), len(points))).transpose(2, 0, 1)
         by_params[:, 0, 0], by_params[:, 1, 1] = plane[:, 0], plane[:, 1]
         by_params[:, 0, 2] = by_params[:, 1, 3] = 1.0
         by_params[:, :, 4:] = by_distortion * params[:2, None]

@@ -49,7 +49,7 @@ class FisheyeModel(LensModel):
             by_r_over_r = (slope * z / square - scale) / (r * r)
             by_r_over_r = np.where(r < NEAR_AXIS * z, 2.0 * (distortion[0] - 1.0 / 3.0) / z**3, by_r_over_r)
             direction = np.where(r[:, None] > 0, xy / r[:, None], 0.0)
-        by_point = np.empty((len(points), 2, 3))
+        by_point = np.empty((2, 3, len(points))).transpose(2, 0, 1)
         by_point[:, :, :2] = xy[:, :, None] * xy[:, None, :] * by_r_over_r[:, None, None]
         by_point[:, 0, 0] += scale
         by_point[:, 1, 1] += scale

@@ -62,9 +62,9 @@ class OpenCVModel(LensModel):
             by_plane = by_bent @ by_plane
             by_coefficients = by_bent @ by_coefficients
             by_coefficients[:, :, 12:] = by_tilt
-        by_point = np.empty((len(points), 2, 3))
+        by_point = np.empty((2, 3, len(points))).transpose(2, 0, 1)
         by_point[:, :, :2] = by_plane / points[:, 2, None, None]
-        by_point[:, :, 2] = -(by_point[:, :, :2] @ plane[:, :, None])[:, :, 0]
+        by_point[:, :, 2] = -by_point[:, :, 0] * plane[:, :1] - by_point[:, :, 1] * plane[:, 1:]
         return bent, by_point, by_coefficients
 
     def _undistorted(self, plane: Floats, distortion: Params, tolerance: float) -> Points:
@@ -80,11 +80,14 @@ class OpenCVModel(LensModel):
 
     def _on_plane(self, points: Points, distortion: Params) -> Floats:
         """(N, 2) x/z, y/z; NaN behind the camera and beyond the valid radius."""
-        z = points[:, 2]
+        x, y, z = points.T
+        plane = np.empty((2, len(points)))
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            plane = np.asarray(points[:, :2] / np.where(z > 0, z, np.nan)[:, None], dtype=np.float64)
-            plane[~(np.hypot(plane[:, 0], plane[:, 1]) <= self.valid_radius(distortion))] = np.nan
-        return plane
+            np.divide(x, z, out=plane[0])
+            np.divide(y, z, out=plane[1])
+            seen = (z > 0) & (np.hypot(plane[0], plane[1]) <= self.valid_radius(distortion))
+        plane[:, ~seen] = np.nan
+        return plane.T
 
 
 @lru_cache(maxsize=1024)  # roots take longer than projecting a view, and every projection asks
@@ -116,12 +119,12 @@ def _bent(plane: Floats, d: Params) -> Floats:
     r2 = x * x + y * y
     numerator, denominator, _ = _radial(r2, d)
     radial, xy2 = numerator / denominator, 2.0 * x * y
-    return np.column_stack(
+    return np.array(
         [
             x * radial + p1 * xy2 + p2 * (r2 + 2 * x * x) + r2 * (s1 + s2 * r2),
             y * radial + p1 * (r2 + 2 * y * y) + p2 * xy2 + r2 * (s3 + s4 * r2),
         ]
-    )
+    ).T
 
 
 def _bent_jacobians(plane: Floats, d: Params, count: int) -> tuple[Floats, Floats]:
@@ -132,14 +135,14 @@ def _bent_jacobians(plane: Floats, d: Params, count: int) -> tuple[Floats, Float
     r2 = x * x + y * y
     numerator, denominator, radial_by_r2 = _radial(r2, d)
     radial = numerator / denominator
-    by_plane = np.empty((len(plane), 2, 2))
+    by_plane = np.empty((2, 2, len(plane))).transpose(2, 0, 1)
     common_x = 2 * radial_by_r2 * x + 2 * (s1 + 2 * s2 * r2)
     common_y = 2 * radial_by_r2 * y + 2 * (s3 + 2 * s4 * r2)
     by_plane[:, 0, 0] = radial + common_x * x + 2 * p1 * y + 6 * p2 * x
     by_plane[:, 0, 1] = common_x * y + 2 * p1 * x + 2 * p2 * y
     by_plane[:, 1, 0] = common_y * x + 2 * p1 * x + 2 * p2 * y
     by_plane[:, 1, 1] = radial + common_y * y + 6 * p1 * y + 2 * p2 * x
-    by_coefficients = np.zeros((len(plane), 2, count))
+    by_coefficients = np.zeros((2, count, len(plane))).transpose(2, 0, 1)
     powers = (r2, r2 * r2, r2 * r2 * r2)
     for index, factor in zip((0, 1, 4), powers, strict=True):
         if index < count:

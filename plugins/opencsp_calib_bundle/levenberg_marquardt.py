@@ -9,10 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
-from opencsp_calib.normal_equations import NormalEquations, linearise, well_conditioned
+from opencsp_calib.normal_equations import NormalEquations, Parts, linearise, well_conditioned
 from opencsp_calib.schur import factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
 from opencsp_calib_bundle.extrapolation import extrapolated
@@ -44,7 +43,7 @@ class Minimum:
     ----------
     estimate : Estimate
     equations : NormalEquations
-        At the estimate.
+        At the estimate, or so near that they do not differ.
     converged : bool
     """
 
@@ -55,9 +54,9 @@ class Minimum:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step of the unknowns, (M, 1), (C, 3, 1) and (V, 6, 1), and how much it promises to lower the cost."""
+    """A step of the unknowns, and how much it promises to lower the cost."""
 
-    parts: tuple[Floats, Floats, Floats]
+    parts: Parts
     promised: float
 
 
@@ -136,13 +135,19 @@ def _descended(
     tolerance: float,
     damping: float,
 ) -> Minimum:
-    """Until a step promises to lower the cost by less than the tolerance, as a part of it."""
+    """Until a step promises to lower the cost by less than the tolerance, as a part of it.
+
+    That step is taken, but the equations are those before it: of so short a step nothing could be seen in them.
+    """
     rounding = EXACT_PX * table.typical_weight * len(table) ** 0.5
     growth, fall, polishes = GROWTH, 0.01, 0
     for _ in range(MAX_STEPS):
         step = _step(equations, damping)
-        there = _after(lens, table, estimate, equations.unknowns, step) if step else None
         slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
+        if step and damping <= FIRST_DAMPING:
+            if step.promised <= max(tolerance * equations.cost, rounding**2) or polishes > POLISHES:
+                return Minimum(estimate.moved(equations.unknowns, *step.parts), equations, converged=True)
+        there = _after(lens, table, estimate, equations.unknowns, step) if step else None
         if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
             damping, growth, fall = damping * growth, growth * 2.0, 0.3
             if damping > MAX_DAMPING:
@@ -151,9 +156,6 @@ def _descended(
         kept = (equations.cost - there[1].cost) / step.promised if step.promised > slack else 1.0
         estimate, equations = there
         polishes += step.promised <= slack
-        done = step.promised <= max(tolerance * equations.cost, rounding**2) or polishes > POLISHES
-        if done and damping <= FIRST_DAMPING:
-            return Minimum(estimate, equations, converged=True)
         damping, growth = max(damping * max(fall, 1.0 - (2.0 * kept - 1.0) ** 3), LEAST_DAMPING), GROWTH
     last = _step(equations, LEAST_DAMPING)
     return Minimum(estimate, equations, converged=last is not None and last.promised <= ENOUGH * equations.cost)
@@ -161,13 +163,10 @@ def _descended(
 
 def _step(equations: NormalEquations, damping: float) -> _Step | None:
     """None where the damped matrix is still singular."""
-    right = (
-        -equations.shared_gradient.sum(axis=0)[:, None],
-        -equations.corner_gradient.sum(axis=0)[:, :, None],
-        -equations.pose_gradient[:, :, None],
-    )
+    shared, corner, pose = equations.gradient
+    right = -shared, -corner, -pose
     try:
-        parts = factorise(equations, damping).solve(*right)
+        parts = factorise(equations, damping).solve(right)
     except np.linalg.LinAlgError:
         return None
     return _Step(parts, float(sum((a * b).sum() for a, b in zip(right, parts, strict=True))))
@@ -177,5 +176,5 @@ def _after(
     lens: LensModel, table: CornerTable, estimate: Estimate, unknowns: Unknowns, step: _Step
 ) -> tuple[Estimate, NormalEquations]:
     with np.errstate(all="ignore"):  # a wild step may overflow; then the cost is not lower
-        moved = estimate.moved(unknowns, *(part[..., 0] for part in step.parts))
+        moved = estimate.moved(unknowns, *step.parts)
         return moved, linearise(lens, table, moved, unknowns)

@@ -9,8 +9,9 @@ from opencsp_calib.arrays import Mask
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.free_board import laid_on_given, with_lone_corners
+from opencsp_calib.jacobian import residuals
 from opencsp_calib.models import LENS_MODELS, LensModel
-from opencsp_calib.normal_equations import residuals, solvable_corners
+from opencsp_calib.normal_equations import solvable_corners
 from opencsp_calib.solving import MIN_CORNERS, check_request, finished
 from opencsp_calib.unknowns import Estimate, Unknowns
 from opencsp_calib_bundle.levenberg_marquardt import Minimum, minimise
@@ -21,6 +22,7 @@ from opencsp_calib_bundle.verdict import checked_covariance, remarks
 __all__ = ["BundleSolver"]
 
 ROUNDS = 10  # of weights, then of outliers: they settle in two or three
+ROUGH_CORNERS = 4096  # enough to begin with: residuals of all corners tell what is wrong with a few
 POOR_PX = 1.0  # where residuals are typically larger, a guess may have led astray
 SETTLED = 0.9  # of the scale of the residuals before: when they fall no further, weights have settled
 
@@ -83,7 +85,18 @@ class BundleSolver:
 
 
 def _roughly(observations: Observations, model: str, options: SolveOptions, table: CornerTable) -> Estimate:
-    """An estimate near enough to tell outliers from it, with the board as given."""
+    """An estimate near enough to tell outliers from it, with the board as given: from some of the corners.
+
+    From all of them where the camera that some ask for cannot see the others.
+    """
+    some = table.thinned(ROUGH_CORNERS)
+    estimate = _roughly_from(observations, model, options, some)
+    if len(some) < len(table) and np.isnan(residuals(LENS_MODELS[model], table, estimate)).any():
+        return _roughly_from(observations, model, options, table)
+    return estimate
+
+
+def _roughly_from(observations: Observations, model: str, options: SolveOptions, table: CornerTable) -> Estimate:
     lens = LENS_MODELS[model]
     _, unknowns = _solvable(observations, lens, replace(options, board_shape="flat"), table)
 

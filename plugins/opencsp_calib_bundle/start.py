@@ -6,7 +6,7 @@ from opencsp_calib import CalibrationFailedError, Camera, Observations, Pose, So
 from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.initial import initial_camera, initial_poses
-from opencsp_calib.normal_equations import residuals
+from opencsp_calib.jacobian import residuals
 from opencsp_calib.pose_fit import fit_pose
 from opencsp_calib.unknowns import Estimate
 

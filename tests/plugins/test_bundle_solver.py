@@ -18,7 +18,7 @@ from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.resampling import held_out
-from opencsp_calib.schur import factorise
+from opencsp_calib.schur import CornersKept, factorise
 from opencsp_calib.synthetic import bowed, demo_camera, observe, pose_in_view, random_poses
 
 SMALL = Checkerboard(9, 7, 0.04)
@@ -125,7 +125,7 @@ def test_gradient_vanishes(options):
     equations = normal_equations(solved(small_world(12, noise_px=0.1, truth=bowed(SMALL, 1e-3)), **options))
     gradients = (
         (equations.shared_gradient.sum(axis=0), np.diagonal(equations.shared.sum(axis=0))),
-        (equations.corner_gradient.sum(axis=0), np.diagonal(equations.corner.sum(axis=0), axis1=1, axis2=2)),
+        (equations.corner_gradient, np.diagonal(equations.corner, axis1=1, axis2=2)),
         (equations.pose_gradient, np.diagonal(equations.pose, axis1=1, axis2=2)),
     )
     for gradient, square in gradients:
@@ -384,7 +384,7 @@ def test_a_measured_board_is_taken_as_it_is():
 
 def test_with_many_views_poses_are_eliminated_instead_of_corners():
     calibration = solved(small_world(40, noise_px=0.1, truth=bowed(SMALL, 1e-3)), board_shape="free")
-    assert not factorise(normal_equations(calibration)).poses_kept
+    assert isinstance(factorise(normal_equations(calibration)), CornersKept)
     assert worst_px(demo_camera(), calibration.camera) < 0.2
     assert remaining_sigmas(calibration) < 1e-6
 

@@ -1,0 +1,118 @@
+"""How a camera moves when each view in turn is left out: one Newton step each, everything else solved again."""
+
+import numpy as np
+
+from opencsp_calib.arrays import Floats, Matrix
+from opencsp_calib.jacobian import CORNER, ViewRows
+from opencsp_calib.normal_equations import NormalEquations
+from opencsp_calib.schur import Factorisation, factorise
+from opencsp_calib.triangular import CholeskyRoot
+
+__all__ = ["camera_without_each_view"]
+
+CG_TOLERANCE = 1e-8  # of the step's length, in sigmas
+CG_STEPS = 200
+TOGETHER = 2**18  # numbers: as many views are left out at once as have so many unknowns
+
+
+def camera_without_each_view(equations: NormalEquations) -> Floats:
+    """How the camera's parameters move when each view in turn is left out.
+
+    Where the board's shape is free, many left-out views are solved for at once by conjugate gradients that start from
+    the factor of the whole: one view of many changes little, so few steps are needed.
+
+    Returns
+    -------
+    (V, P)
+        Parameters without the view minus those with it; NaN where the others do not determine them.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If all views together do not determine them.
+    """
+    cameras = equations.unknowns.camera.shape[1]
+    steps = _by_iteration(equations) if len(equations.unknowns.corners) else _directly(equations)
+    return np.asarray(steps[:, :cameras] @ equations.unknowns.camera.T)
+
+
+def _directly(equations: NormalEquations) -> Floats:
+    """(V, M): with a small dense matrix for each view."""
+    solved = np.linalg.solve(
+        equations.pose,
+        np.concatenate([equations.shared_pose.transpose(0, 2, 1), equations.pose_gradient[..., None]], axis=2),
+    )
+    information = equations.shared - equations.shared_pose @ solved[..., :-1]
+    gradient = equations.shared_gradient - (equations.shared_pose @ solved[..., -1:])[..., 0]
+    rest, rest_gradient = information.sum(axis=0) - information, gradient.sum(axis=0) - gradient
+    steps = np.full(gradient.shape, np.nan)
+    for view, (matrix, right) in enumerate(zip(rest, rest_gradient, strict=True)):
+        scale = 1.0 / np.sqrt(np.diag(matrix))
+        try:
+            root = CholeskyRoot.of(scale[:, None] * matrix * scale)
+        except np.linalg.LinAlgError:
+            continue  # stays NaN: the other views leave something open
+        steps[view] = -scale * root.solve(scale * right)
+    return steps
+
+
+def _by_iteration(equations: NormalEquations) -> Floats:
+    """(V, M)."""
+    whole, inverse_pose = factorise(equations), np.asarray(np.linalg.inv(equations.pose), dtype=np.float64)
+    views, size = len(inverse_pose), equations.unknowns.shared + CORNER * len(equations.unknowns.corners)
+    together = max(1, TOGETHER // size)
+    runs = [(begin, min(begin + together, views)) for begin in range(0, views, together)]
+    return np.concatenate([_without(whole, inverse_pose, run) for run in runs])[:, : equations.unknowns.shared]
+
+
+def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int]) -> Floats:
+    """(n, M + 3 C) of a run of views: preconditioned conjugate gradients on S - S_v, S being factored, S_v of one view.
+
+    Both with the poses eliminated. The product of S with the search direction follows from the recurrence, so S itself
+    is never needed. Both are singular in the directions of the gauge, which right-hand sides have no part in.
+    """
+    right = _of_views(whole.equations, inverse_pose, views, None)
+    x, residual = np.zeros_like(right), right.copy()
+    direction, whole_direction = np.zeros_like(right), np.zeros_like(right)
+    before = np.ones(len(right))
+    for step in range(CG_STEPS):
+        preconditioned = whole.solve_without_poses(residual.T).T
+        now = np.einsum("vi,vi->v", residual, preconditioned)
+        if step == 0:
+            start = now.copy()
+        active = now > CG_TOLERANCE**2 * start
+        if not active.any():
+            break
+        factor = np.where(active, now / before, 0.0) if step else np.zeros_like(now)
+        direction = preconditioned + factor[:, None] * direction
+        whole_direction = residual + factor[:, None] * whole_direction
+        product = whole_direction - _of_views(whole.equations, inverse_pose, views, direction)
+        curvature = np.einsum("vi,vi->v", direction, product)
+        length = np.divide(now, curvature, out=np.zeros_like(now), where=active & (curvature > 0))
+        x += length[:, None] * direction
+        residual -= length[:, None] * product
+        before = np.where(active, now, 1.0)
+    x[active] = np.nan
+    return x
+
+
+def _of_views(
+    equations: NormalEquations, inverse_pose: Floats, views: tuple[int, int], x: Floats | None
+) -> Floats:
+    """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own; without one, its gradient."""
+    shared, corners = equations.unknowns.shared, len(equations.unknowns.corners)
+    products = np.zeros((views[1] - views[0], shared + CORNER * corners))
+    for rows in equations.rows(*views):
+        moved = rows.residual if x is None else _moved(rows, x[rows.view - views[0]], shared)
+        turned = (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
+        moved = moved - (inverse_pose[rows.view] @ turned) @ rows.pose
+        product = products[rows.view - views[0]]
+        product[:shared] = (rows.shared @ moved[:, :, None]).sum(axis=0)[:, 0]
+        product[shared:].reshape(CORNER, corners)[:, rows.columns] = (rows.corner * moved[:, None]).sum(axis=0)
+    return products
+
+
+def _moved(rows: ViewRows, x: Floats, shared: int) -> Matrix:
+    """(2, n) by how much a view's residuals change with a step of the shared unknowns and the corners."""
+    corners = x[shared:].reshape(CORNER, -1)[:, rows.columns]
+    return np.asarray(x[:shared] @ rows.shared + (rows.corner * corners).sum(axis=1))
