@@ -58,7 +58,7 @@ class ViewRows:
 
     def corner_pose(self) -> Floats:
         """(3, 6, n) products of each corner's shift with the pose: the blocks of JᵀJ that tie the two."""
-        return np.einsum("ain,apn->ipn", self.corner, self.pose)
+        return np.asarray(np.einsum("ain,apn->ipn", self.corner, self.pose))
 
 
 def residuals(lens: LensModel, table: CornerTable, estimate: Estimate) -> Floats:
@@ -94,10 +94,10 @@ def rows_of_each_view(
     """
     runs = list(table.chunks(*views))
     longest = max((table.span(*run).stop - table.span(*run).start for run in runs), default=0)
-    used_again = None if room is not None else np.empty((2, row_count(unknowns), longest))
+    used_again = room is None
+    room = np.empty((2, row_count(unknowns), longest)) if room is None else room
     for run in runs:
-        here = table.span(*run, since=views[0] if used_again is None else run[0])
-        values = (room if used_again is None else used_again)[:, :, here]
+        values = room[:, :, table.span(*run, since=run[0] if used_again else views[0])]
         _fill(values, lens, table, estimate, unknowns, run)
         yield from split_by_view(table, unknowns, run, values)
 

@@ -5,35 +5,35 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.jacobian import CORNER, ViewRows
 from opencsp_calib.normal_equations import NormalEquations
-from opencsp_calib.schur import Factorisation, factorise
+from opencsp_calib.schur import Factorisation
 from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["camera_without_each_view"]
 
-CG_TOLERANCE = 1e-8  # of the step's length, in sigmas
+CG_TOLERANCE = 1e-6  # of the step's length, in sigmas
 CG_STEPS = 200
 TOGETHER = 2**18  # numbers: as many views are left out at once as have so many unknowns
 
 
-def camera_without_each_view(equations: NormalEquations) -> Floats:
+def camera_without_each_view(whole: Factorisation) -> Floats:
     """How the camera's parameters move when each view in turn is left out.
 
     Where the board's shape is free, many left-out views are solved for at once by conjugate gradients that start from
     the factor of the whole: one view of many changes little, so few steps are needed.
 
+    Parameters
+    ----------
+    whole : Factorisation
+        Of all views, not damped.
+
     Returns
     -------
     (V, P)
         Parameters without the view minus those with it; NaN where the others do not determine them.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If all views together do not determine them.
     """
-    cameras = equations.unknowns.camera.shape[1]
-    steps = _by_iteration(equations) if len(equations.unknowns.corners) else _directly(equations)
-    return np.asarray(steps[:, :cameras] @ equations.unknowns.camera.T)
+    unknowns = whole.equations.unknowns
+    steps = _by_iteration(whole) if len(unknowns.corners) else _directly(whole.equations)
+    return np.asarray(steps[:, : unknowns.camera.shape[1]] @ unknowns.camera.T)
 
 
 def _directly(equations: NormalEquations) -> Floats:
@@ -56,13 +56,14 @@ def _directly(equations: NormalEquations) -> Floats:
     return steps
 
 
-def _by_iteration(equations: NormalEquations) -> Floats:
+def _by_iteration(whole: Factorisation) -> Floats:
     """(V, M)."""
-    whole, inverse_pose = factorise(equations), np.asarray(np.linalg.inv(equations.pose), dtype=np.float64)
-    views, size = len(inverse_pose), equations.unknowns.shared + CORNER * len(equations.unknowns.corners)
+    unknowns = whole.equations.unknowns
+    inverse_pose = np.asarray(np.linalg.inv(whole.equations.pose), dtype=np.float64)
+    views, size = len(inverse_pose), unknowns.shared + CORNER * len(unknowns.corners)
     together = max(1, TOGETHER // size)
     runs = [(begin, min(begin + together, views)) for begin in range(0, views, together)]
-    return np.concatenate([_without(whole, inverse_pose, run) for run in runs])[:, : equations.unknowns.shared]
+    return np.concatenate([_without(whole, inverse_pose, run) for run in runs])[:, : unknowns.shared]
 
 
 def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int]) -> Floats:
@@ -96,10 +97,8 @@ def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int])
     return x
 
 
-def _of_views(
-    equations: NormalEquations, inverse_pose: Floats, views: tuple[int, int], x: Floats | None
-) -> Floats:
-    """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own; without one, its gradient."""
+def _of_views(equations: NormalEquations, inverse_pose: Floats, views: tuple[int, int], x: Floats | None) -> Floats:
+    """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own; or its gradient."""
     shared, corners = equations.unknowns.shared, len(equations.unknowns.corners)
     products = np.zeros((views[1] - views[0], shared + CORNER * corners))
     for rows in equations.rows(*views):

@@ -118,17 +118,17 @@ class NormalEquations:
     @property
     def corner(self) -> Floats:
         """(C, 3, 3)."""
-        return self.by_corner[:, :CORNER].transpose(2, 0, 1)
+        return np.asarray(self.by_corner[:, :CORNER].transpose(2, 0, 1))
 
     @property
     def corner_shared(self) -> Floats:
         """(C, 3, M)."""
-        return self.by_corner[:, CORNER:-1].transpose(2, 0, 1)
+        return np.asarray(self.by_corner[:, CORNER:-1].transpose(2, 0, 1))
 
     @property
     def corner_gradient(self) -> Floats:
         """(C, 3)."""
-        return self.by_corner[:, -1].T
+        return np.asarray(self.by_corner[:, -1].T)
 
     @property
     def gradient(self) -> Parts:

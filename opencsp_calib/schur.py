@@ -24,7 +24,7 @@ from opencsp_calib.jacobian import CORNER, POSE
 from opencsp_calib.normal_equations import NormalEquations, Parts
 from opencsp_calib.triangular import CholeskyRoot
 
-__all__ = ["Factorisation", "camera_covariance", "factorise"]
+__all__ = ["CornersKept", "Factorisation", "PosesKept", "factorise"]
 
 TOGETHER = 32  # views whose poses are eliminated at once: matrices large enough for BLAS
 
@@ -56,6 +56,13 @@ class Factorisation(ABC):
         half = np.linalg.inv(self.root.lower[-shared:, -shared:]) * self.scale[-shared:]
         return np.asarray(half.T @ half)
 
+    @property
+    def camera_covariance(self) -> Matrix:
+        """(P, P) inverse information of the camera's parameters, all else marginalised; times s² their covariance."""
+        basis = self.equations.unknowns.camera
+        cameras = basis.shape[1]
+        return np.asarray(basis @ self.shared_covariance[:cameras, :cameras] @ basis.T)
+
     @abstractmethod
     def solve(self, right: Parts) -> Parts:
         """The solution for a right-hand side."""
@@ -84,19 +91,6 @@ def factorise(equations: NormalEquations, damping: float = 0.0) -> Factorisation
     views, corners = len(equations.pose), len(equations.corner)
     kind = PosesKept if POSE * views < CORNER * corners else CornersKept
     return kind.of(equations, damping)
-
-
-def camera_covariance(equations: NormalEquations) -> Matrix:
-    """(P, P) inverse information of the camera's parameters, poses and board marginalised; times s² their covariance.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        If the observations do not determine them.
-    """
-    basis = equations.unknowns.camera
-    cameras = basis.shape[1]
-    return np.asarray(basis @ factorise(equations).shared_covariance[:cameras, :cameras] @ basis.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,6 +132,7 @@ class PosesKept(Factorisation):
 
     def solve_without_poses(self, right: Floats) -> Floats:
         """See `Factorisation.solve_without_poses`."""
+        right = np.ascontiguousarray(right)  # whose columns one after the other would take five times as long
         shared, columns = self.equations.unknowns.shared, right.shape[1]
         poses = np.zeros((self.equations.pose_gradient.size, columns))
         corners = right[shared:].reshape(CORNER, -1, columns)
@@ -205,7 +200,8 @@ def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[Ma
         for rows in equations.rows(begin, end):
             ties[rows.view - begin][:, :, rows.columns] = rows.corner_pose().transpose(1, 0, 2)
         shared = equations.shared_pose[begin:end].transpose(0, 2, 1)
-        coupling = inverse_roots[begin:end] @ np.concatenate([ties.reshape(len(shared), POSE, CORNER * corners), shared], axis=2)
+        ties = np.concatenate([ties.reshape(len(shared), POSE, CORNER * corners), shared], axis=2)
+        coupling = inverse_roots[begin:end] @ ties
         yield coupling.reshape(-1, coupling.shape[2])
 
 

@@ -28,7 +28,7 @@ from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
-from opencsp_calib.schur import camera_covariance
+from opencsp_calib.schur import factorise
 
 __all__ = [
     "Influence",
@@ -89,8 +89,9 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
         equations = normal_equations(calibration)
         if equations.dof <= 0:
             raise np.linalg.LinAlgError("no more observations than unknowns")
-        residual = camera_covariance(equations) * max(equations.cost / equations.dof, ROUNDING**2)
-        steps = camera_without_each_view(equations)
+        factor = factorise(equations)
+        residual = factor.camera_covariance * max(equations.cost / equations.dof, ROUNDING**2)
+        steps = camera_without_each_view(factor)
     except np.linalg.LinAlgError as error:
         message = f"the views do not determine the camera ({error}): take more of them, from different directions"
         return calibration.with_problems(Problem("undetermined", message))
@@ -116,7 +117,7 @@ def influence(calibration: Calibration) -> tuple[Influence, ...]:
         If all views together do not determine it.
     """
     try:
-        steps = camera_without_each_view(normal_equations(calibration))
+        steps = camera_without_each_view(factorise(normal_equations(calibration)))
     except np.linalg.LinAlgError as error:
         raise CalibrationFailedError(
             f"no influence of views: together they do not determine the camera ({error})"

@@ -12,7 +12,7 @@ from opencsp_calib.detection import Detection
 from opencsp_calib.information import FLAT, ProjectionGoal, view_information
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import camera_sigma_map
-from opencsp_calib.schur import camera_covariance
+from opencsp_calib.schur import factorise
 from opencsp_calib.synthetic import demo_camera, observe, random_poses, seed_poses
 
 BOARD = Checkerboard(9, 6, 0.1)
@@ -38,7 +38,7 @@ def test_variance_is_that_of_the_solved_calibration(camera, aspect, shape, range
         camera = replace(camera, params=[camera.params[0], camera.params[0], *camera.params[2:]])
     poses = random_poses(BOARD, camera, 12, 1, tilt_deg=(10, 50), fill=(0.3, 0.9))
     solved = BundleSolver().solve(observe(camera, BOARD, poses), camera.model, options)
-    covariance = NOISE_PX**2 * camera_covariance(normal_equations(solved))
+    covariance = NOISE_PX**2 * factorise(normal_equations(solved)).camera_covariance
     expected = camera_sigma_map(camera, covariance, range_m).rms_px
     goal = ProjectionGoal.of(camera, BOARD, range_m, options=options)
     predicted = np.sqrt(goal.variance_px2(informations(camera, poses, options).sum(axis=0)))

@@ -17,7 +17,7 @@ from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.normal_equations import NormalEquations, linearise, normal_equations, solvable_corners
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.schur import CornersKept, PosesKept, camera_covariance, factorise
+from opencsp_calib.schur import CornersKept, PosesKept, factorise
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses
 from opencsp_calib.triangular import CholeskyRoot
 from opencsp_calib.unknowns import Estimate, Unknowns, warp_basis
@@ -162,7 +162,7 @@ def test_solution_and_covariance_are_those_of_the_dense_pseudo_inverse(shape, as
     q = basis.shape[1]
     expected = basis @ scaled_pinv(matrix)[:q, :q] @ basis.T
     sigma = np.sqrt(np.diag(expected))
-    assert np.abs((camera_covariance(dense.equations) - expected) / np.outer(sigma, sigma)).max() < 1e-6
+    assert np.abs((factorise(dense.equations).camera_covariance - expected) / np.outer(sigma, sigma)).max() < 1e-6
 
 
 @pytest.mark.parametrize(("shape", "aspect"), SHAPES)
@@ -170,8 +170,8 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
     dense = Dense(world(12, SolveOptions(board_shape=shape, pixel_aspect=aspect)))
     equations = at_minimum(dense)
     basis = dense.unknowns.camera
-    sigma = np.sqrt(np.diag(camera_covariance(equations)))
-    found = camera_without_each_view(equations)
+    sigma = np.sqrt(np.diag(factorise(equations).camera_covariance))
+    found = camera_without_each_view(factorise(equations))
     for view, step in enumerate(found):
         rest = np.arange(len(found)) != view
         table, estimate = equations.table, equations.estimate
@@ -185,9 +185,7 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
 def test_gauge_steps_change_nothing_that_is_seen():
     dense = Dense(world(4, SolveOptions(board_shape="free")))
     e = dense.equations
-    gauge = np.concatenate(
-        [np.zeros((e.unknowns.shared, 7)), *(part.reshape(-1, 7) for part in e.gauge())]
-    )
+    gauge = np.concatenate([np.zeros((e.unknowns.shared, 7)), *(part.reshape(-1, 7) for part in e.gauge())])
     assert np.linalg.matrix_rank(gauge) == 7
     scale = np.sqrt(np.diag(dense.matrix(e)))
     moved = dense.jacobian() @ (gauge / np.linalg.norm(scale[:, None] * gauge, axis=0))
@@ -207,7 +205,7 @@ def test_views_head_on_determine_nothing():
     poses = tuple(Pose(np.zeros(3), [x, -0.07, 1.0]) for x in (-0.2, -0.1, 0.0))
     calibration = Calibration(camera, observe(camera, BOARD, poses), poses, BOARD, "truth", SolveOptions())
     with pytest.raises(np.linalg.LinAlgError):
-        camera_covariance(normal_equations(calibration))
+        factorise(normal_equations(calibration))
 
 
 def test_outliers_and_corners_seen_once_are_left_out():

@@ -25,7 +25,7 @@ from opencsp_calib.comparison import compare
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment
 from opencsp_calib.registry import installed
-from opencsp_calib.schur import camera_covariance
+from opencsp_calib.schur import factorise
 from opencsp_calib.synthetic import demo_camera, observe, seed_poses
 
 BOARD = Checkerboard(22, 19, 0.05)
@@ -37,7 +37,7 @@ NAMES = ("fx", "fy", "cx", "cy", "projections")
 
 def errors_and_bounds(calibration: Calibration) -> tuple[Floats, Floats]:
     """Of fx, fy, cx, cy and projections (length, rms over the image), px."""
-    covariance = NOISE_PX**2 * camera_covariance(normal_equations(calibration))
+    covariance = NOISE_PX**2 * factorise(normal_equations(calibration)).camera_covariance
     jacobian = Alignment.at_infinity(CAMERA).grid_jacobian  # (N, 2, P)
     projected = np.einsum("nip,pq,niq->n", jacobian, covariance, jacobian).mean() ** 0.5
     difference = compare(CAMERA, calibration.camera).rms_px

@@ -33,7 +33,7 @@ from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, sigma_map, sigma_over_range
 from opencsp_calib.resampling import compare_halves, leaving_each_out
-from opencsp_calib.schur import camera_covariance
+from opencsp_calib.schur import factorise
 from opencsp_calib.synthetic import demo_camera, observe, seed_poses
 from opencsp_calib.uncertainty import (
     honest_covariance,
@@ -65,8 +65,9 @@ def solved(observations: Observations, options: SolveOptions) -> Calibration:
 def covariances(calibration: Calibration) -> dict[str, np.ndarray]:
     """The three estimates."""
     equations = normal_equations(calibration)
-    residual = camera_covariance(equations) * equations.cost / equations.dof
-    jackknife = jackknife_covariance(camera_without_each_view(equations))
+    factor = factorise(equations)
+    residual = factor.camera_covariance * equations.cost / equations.dof
+    jackknife = jackknife_covariance(camera_without_each_view(factor))
     return {
         "residual": residual,
         "jackknife": jackknife,

@@ -87,7 +87,7 @@ class OpenCVModel(LensModel):
             np.divide(y, z, out=plane[1])
             seen = (z > 0) & (np.hypot(plane[0], plane[1]) <= self.valid_radius(distortion))
         plane[:, ~seen] = np.nan
-        return plane.T
+        return np.asarray(plane.T)
 
 
 @lru_cache(maxsize=1024)  # roots take longer than projecting a view, and every projection asks
@@ -119,12 +119,13 @@ def _bent(plane: Floats, d: Params) -> Floats:
     r2 = x * x + y * y
     numerator, denominator, _ = _radial(r2, d)
     radial, xy2 = numerator / denominator, 2.0 * x * y
-    return np.array(
+    bent = np.array(
         [
             x * radial + p1 * xy2 + p2 * (r2 + 2 * x * x) + r2 * (s1 + s2 * r2),
             y * radial + p1 * (r2 + 2 * y * y) + p2 * xy2 + r2 * (s3 + s4 * r2),
         ]
-    ).T
+    )
+    return np.asarray(bent.T)
 
 
 def _bent_jacobians(plane: Floats, d: Params, count: int) -> tuple[Floats, Floats]:

@@ -144,9 +144,9 @@ def _descended(
     for _ in range(MAX_STEPS):
         step = _step(equations, damping)
         slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
-        if step and damping <= FIRST_DAMPING:
-            if step.promised <= max(tolerance * equations.cost, rounding**2) or polishes > POLISHES:
-                return Minimum(estimate.moved(equations.unknowns, *step.parts), equations, converged=True)
+        least = polishes > POLISHES or (step and step.promised <= max(tolerance * equations.cost, rounding**2))
+        if step and least and damping <= FIRST_DAMPING:
+            return Minimum(estimate.moved(equations.unknowns, *step.parts), equations, converged=True)
         there = _after(lens, table, estimate, equations.unknowns, step) if step else None
         if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
             damping, growth, fall = damping * growth, growth * 2.0, 0.3

@@ -7,7 +7,7 @@ from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.board_shape import TURNED_DEG, roll_spread_deg
 from opencsp_calib.convergence import LEAST_SIGMA_PX, OPEN_CENTRE, OPEN_FOCAL
 from opencsp_calib.models import LensModel
-from opencsp_calib.schur import camera_covariance
+from opencsp_calib.schur import factorise
 from opencsp_calib_bundle.levenberg_marquardt import Minimum
 
 __all__ = ["checked_covariance", "remarks"]
@@ -43,7 +43,7 @@ def checked_covariance(
             f"{options.board_shape} board: take more views"
         )
     try:
-        information = camera_covariance(equations)
+        information = factorise(equations).camera_covariance
     except np.linalg.LinAlgError:
         information = np.full((len(lens.parameter_names),) * 2, np.inf)
     floor = LEAST_SIGMA_PX * typical_weight
