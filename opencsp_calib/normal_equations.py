@@ -40,6 +40,7 @@ __all__ = [
 
 TOLD_APART = 1e-8  # smallest eigenvalue of the camera's scaled information, poses held, that leaves enough digits
 ROUNDING = 1e-15  # below this an eigenvalue is made of it
+ALL = slice(None)
 KEPT = 32768  # corners: of so many, rows of J are kept (10 MB); of more, they are made again when they are needed
 
 Parts: TypeAlias = tuple[Floats, Floats, Floats]
@@ -166,23 +167,21 @@ class NormalEquations:
         return corner_gauge, pose_gauge
 
 
-def normal_equations(calibration: Calibration) -> NormalEquations:
-    """The normal equations of any solver's calibration, at its solution, without its outliers.
+def normal_equations(calibration: Calibration, views: slice = ALL) -> NormalEquations:
+    """The normal equations of any solver's calibration, at its solution, without its outliers; maybe of some views.
 
     What was solved for and how corners were weighted is taken from its options. Where the board's shape is free,
     corners seen in one view only tell nothing about the camera and are left out.
     """
-    detections = [
-        detection.keeping(~outliers)
-        for detection, outliers in zip(calibration.observations.detections, calibration.outliers, strict=True)
-    ]
+    seen = zip(calibration.observations.detections[views], calibration.outliers[views], strict=True)
+    detections = [detection.keeping(~outliers) if outliers.any() else detection for detection, outliers in seen]
     table = CornerTable.of(detections, calibration.options.weights)
     corners = solvable_corners(table, len(calibration.board.points))
     camera = calibration.camera
     unknowns = Unknowns.of(camera.lens, calibration.observations.board, corners, calibration.options)
     if len(unknowns.corners):
         table = table.keeping(np.isin(table.ids, corners))
-    estimate = Estimate.of(calibration)
+    estimate = Estimate.of(calibration, views)
     equations = linearise(camera.lens, table, estimate, unknowns)
     conditioned = well_conditioned(equations)
     return equations if conditioned is unknowns else linearise(camera.lens, table, estimate, conditioned)

@@ -32,6 +32,7 @@ __all__ = [
     "nearby_halves",
 ]
 
+HALVES = slice(0, None, 2), slice(1, None, 2)
 Solve: TypeAlias = Callable[[Observations], Calibration]
 
 
@@ -85,7 +86,8 @@ def halves(observations: Observations) -> tuple[Observations, Observations]:
     images = [view.image for view in observations.used]
     if len(images) < 4:
         raise InputError(f"{len(images)} views cannot be parted into halves; take at least four")
-    return observations.keeping(images[::2]), observations.keeping(images[1::2])
+    first, second = (observations.keeping(images[half]) for half in HALVES)
+    return first, second
 
 
 def folds(observations: Observations, count: int = 5) -> tuple[tuple[Observations, Observations], ...]:
@@ -132,8 +134,9 @@ def nearby_halves(calibration: Calibration, *, range_m: float | None = None) -> 
     CalibrationFailedError
         If a half does not determine the camera.
     """
+    halves(calibration.observations)  # refused where there are too few views
     try:
-        first, second = (_stepped(_part(calibration, half)) for half in halves(calibration.observations))
+        first, second = (_camera_of(calibration, half) for half in HALVES)
     except np.linalg.LinAlgError as error:
         raise CalibrationFailedError(f"half of the views do not determine the camera ({error})") from None
     return compare(first, second, range_m=range_m)
@@ -177,22 +180,9 @@ def known_corners(calibration: Calibration) -> Mask:
     return np.asarray(np.bincount(ids, minlength=count) >= 2)
 
 
-def _part(calibration: Calibration, observations: Observations) -> Calibration:
-    """The same solution as seen by some of its views."""
-    kept = {view.image for view in observations.used}
-    chosen = [index for index, view in enumerate(calibration.observations.used) if view.image in kept]
-    return replace(
-        calibration,
-        observations=observations,
-        cam_from_board=tuple(calibration.cam_from_board[i] for i in chosen),
-        residuals=tuple(calibration.residuals[i] for i in chosen),
-        outliers=tuple(calibration.outliers[i] for i in chosen),
-    )
-
-
-def _stepped(calibration: Calibration) -> Camera:
-    """The camera one Newton step nearer to what a calibration's views ask for, poses and board moving with it."""
-    equations = normal_equations(calibration)
+def _camera_of(calibration: Calibration, views: slice) -> Camera:
+    """The camera one Newton step nearer to what some of the views ask for, poses and board moving with it."""
+    equations = normal_equations(calibration, views)
     shared = factorise(equations).solve(equations.gradient)[0]
     basis = equations.unknowns.camera
     camera = calibration.camera

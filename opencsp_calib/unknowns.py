@@ -35,9 +35,9 @@ class Estimate:
     points: Points
 
     @classmethod
-    def of(cls, calibration: Calibration) -> "Estimate":
-        """A calibration's values."""
-        poses = calibration.cam_from_board
+    def of(cls, calibration: Calibration, views: slice = slice(None)) -> "Estimate":
+        """A calibration's values, maybe of some views."""
+        poses = calibration.cam_from_board[views]
         return cls(
             calibration.camera.params,
             rotation_matrices(np.array([p.rotation for p in poses]).reshape(-1, 3)),
