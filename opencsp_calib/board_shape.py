@@ -5,10 +5,14 @@ for costs little: sigmas 1.9, 1.5, 1.2 times as large at 10, 20, 50 views. rms a
 shape. Two things tell whether it is worth its price:
 
 *   the odd and the even views, solved apart, agree clearly better over the image with the shape than without it; or
-*   solving for the shape moves the camera by more than its own uncertainty explains. Halves cannot see an error that
-    both of them share, and two halves with like poses share most of what a bent board does: of worlds with a board
-    0.5 mm out of flat and noise of 0.1 px they get most wrong, with the camera off by ten sigmas. (An estimate that is
-    right either way is held against one that is right only if the board is flat: Hausman 1978.)
+*   solving for the shape moves the camera by more than chance explains. Halves cannot see an error that both of them
+    share, and two halves with like poses share most of what a bent board does: of worlds with a board 0.5 mm out of
+    flat and noise of 0.1 px they get most wrong, with the camera off by ten sigmas. (An estimate that is right either
+    way is held against one that is right only if the board is flat: Hausman 1978.) What chance explains is the
+    jackknife sigma of the move itself: how far it changes when each view in turn is left out.
+
+Neither needs the solution with the shape: from the one without it, one Newton step gives it to a hundredth, and where
+it would not, the board is so bent that there is nothing to decide.
 """
 
 from collections.abc import Callable
@@ -24,11 +28,15 @@ from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibError, CalibrationFailedError
 from opencsp_calib.flatness import not_flat
 from opencsp_calib.initial import initial_camera, initial_poses
+from opencsp_calib.leaving_out import camera_without_each_view
+from opencsp_calib.newton import stepped
+from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.projection_sigma import sigma_map
+from opencsp_calib.projection_sigma import camera_sigma_map
 from opencsp_calib.resampling import nearby_halves
-from opencsp_calib.uncertainty import with_uncertainty
+from opencsp_calib.schur import factorise
+from opencsp_calib.uncertainty import jackknife_covariance, with_uncertainty
 
 __all__ = ["TURNED_DEG", "Run", "decide", "obstacle_to_shape", "roll_spread_deg", "solve_with_aspect"]
 
@@ -40,7 +48,7 @@ MIN_DIRECTIONS_DEG = 20.0
 """Between two lines of sight, in the board's frame: with less, heights are known three times worse than places."""
 TURNED_DEG = 45.0
 CLEARLY = 1.5  # two halves are one draw of a figure that scatters by about half: less is chance
-SIGMAS = 2.0  # a camera that moves by more has a bias that outweighs what the shape adds to its variance
+SIGMAS = 2.0**0.5  # of the move, squared: one of them is chance, and a bias of one outweighs what the shape adds
 
 
 @dataclass(frozen=True)
@@ -52,7 +60,7 @@ class _Evidence:
     given_halves_px, solved_halves_px : float
         How far apart the halves are with the board as given, and with its shape solved for.
     moved_px, sigma_px : float
-        How far solving for the shape moves the camera, and the honest sigma of the camera it moves to.
+        How far solving for the shape moves the camera, and how far chance would.
     """
 
     given_halves_px: float
@@ -69,7 +77,7 @@ class _Evidence:
         return (
             f"odd and even views differ by {self.given_halves_px:.2g} px over the image with the board as given, by "
             f"{self.solved_halves_px:.2g} px with its shape, and solving for it moves the camera by "
-            f"{self.moved_px:.2g} px (sigma {self.sigma_px:.2g} px; all rms)"
+            f"{self.moved_px:.2g} px, chance by {self.sigma_px:.2g} px (all rms)"
         )
 
 
@@ -104,9 +112,9 @@ def decide(observations: Observations, options: SolveOptions, run: Run, *, aspec
     assumed = () if aspect_given else _assumed_square(given.cam_from_board)
     shape = replace(shape, pixel_aspect=1.0) if assumed else shape
     try:
-        solved = _shape_solved(observations, replace(shape, guess=given.camera), run)
-        evidence = _evidence(given, solved)
-    except CalibError as error:
+        evidence = _evidence(given, shape)
+        solved = _shape_solved(observations, replace(shape, guess=given.camera), run) if evidence.for_shape else given
+    except (CalibError, np.linalg.LinAlgError) as error:
         message = f"the board was taken as it is given, because its shape could not be solved for: {error}"
         return given.with_problems(Problem("board-as-given", message))
     if evidence.for_shape:
@@ -199,10 +207,25 @@ def _shape_solved(observations: Observations, options: SolveOptions, run: Run) -
     return solved
 
 
-def _evidence(given: Calibration, solved: Calibration) -> _Evidence:
+def _evidence(given: Calibration, shape: SolveOptions) -> _Evidence:
+    """What one Newton step towards the solution with the board's shape tells.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError, CalibrationFailedError
+        If the views, or half of them, do not determine the shape.
+    """
+    camera, aspect = given.camera, shape.pixel_aspect
+    if aspect is not None:
+        params = camera.params.copy()
+        params[1] = aspect * params[0]
+        camera = replace(camera, params=params)
+    solved = stepped(replace(given, camera=camera, options=shape))
+    steps = (camera_without_each_view(factorise(normal_equations(one))) for one in (given, solved))
+    by_chance = jackknife_covariance(np.subtract(*steps))
     return _Evidence(
         nearby_halves(given).rms_px,
         nearby_halves(solved).rms_px,
         compare(given.camera, solved.camera).rms_px,
-        sigma_map(solved).rms_px,
+        camera_sigma_map(given.camera, by_chance).rms_px,
     )

@@ -30,12 +30,12 @@ def stepped(calibration: Calibration) -> Calibration:
     equations = normal_equations(calibration)
     shared, corner, pose = factorise(equations).solve(equations.gradient)
     moved = equations.estimate.moved(equations.unknowns, -shared, -corner, -pose)
-    return replace(
-        calibration,
+    return Calibration(
         camera=replace(calibration.camera, params=moved.params),
+        observations=calibration.observations,
         cam_from_board=moved.poses,
         board=calibration.board.with_points(moved.points),
-        residuals=None,
-        covariance=None,
-        covariance_residual=None,
+        solver=calibration.solver,
+        options=calibration.options,
+        outliers=calibration.outliers,
     )

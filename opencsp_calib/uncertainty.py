@@ -32,7 +32,9 @@ from opencsp_calib.schur import factorise
 
 __all__ = [
     "Influence",
+    "honest_covariance",
     "influence",
+    "jackknife_covariance",
     "projection_sigma",
     "ray_sigma",
     "sigma_map",
