@@ -48,7 +48,7 @@ MIN_DIRECTIONS_DEG = 20.0
 """Between two lines of sight, in the board's frame: with less, heights are known three times worse than places."""
 TURNED_DEG = 45.0
 CLEARLY = 1.5  # two halves are one draw of a figure that scatters by about half: less is chance
-SIGMAS = 2.0**0.5  # of the move, squared: one of them is chance, and a bias of one outweighs what the shape adds
+SIGMAS = 2.0  # a camera that moves by more has, by about 20 to 1, a bias that outweighs what the shape adds to chance
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,7 @@ from opencsp_calib.convergence import judged
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.opencv import opencv_on_one_thread
+from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 from opencsp_calib.solving import check_request, finished
 from opencsp_calib_opencv.available import missing_opencv
 
@@ -24,6 +25,11 @@ SMALLEST_STEP = 2.3e-16
 """OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
 up to 1e-8 px short. It has no test of the gradient."""
 
+RATIONAL, RESTARTS = 8, 10
+"""From so many coefficients on OpenCV stops short in the long valleys that those leave; from where it stopped it gets
+farther. A few starts are enough."""
+MAGNIFIED = 64.0  # times: what rounding moves, so that a new rounding is small beside it, and the curvature still too
+
 Solution: TypeAlias = tuple[Params, Floats, Floats]  # of the lens model; rotations and translations (V, 3)
 
 
@@ -32,7 +38,8 @@ class OpenCVSolver:
 
     OpenCV takes pixels and, but for fisheye, board points in single precision only. Board points are given in units
     of the spacing, where those of an even board are exact; those of a measured one are rounded by at most 1e-6 of the
-    spacing. Pixels beyond 1024 are rounded by up to 6e-5 px, at random.
+    spacing. Pixels beyond 1024 are rounded by up to 6e-5 px; what that does is found by asking OpenCV a second time,
+    with pixels moved so far that their rounding does not matter, and taken back.
     """
 
     name = "opencv"
@@ -72,11 +79,49 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
         matrix, distortion[:count] = start.matrix, start.distortion
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
     points, pixels = _vendor_points(observations, np.float32)
-    with _vendor_errors(cv2, observations):
-        _, matrix, distortion, rotations, translations = cv2.calibrateCamera(
+
+    def least(pixels: list[Any], matrix: Any, distortion: Any, flags: int) -> tuple[Any, ...]:
+        return cv2.calibrateCamera(
             points, pixels, observations.image_size, matrix, distortion, flags=flags, criteria=_criteria(cv2)
         )
-    return _unpacked(observations, matrix, np.ravel(distortion)[:count], rotations, translations)
+
+    def unpacked(found: tuple[Any, ...]) -> Solution:
+        _, matrix, distortion, rotations, translations = found
+        return _unpacked(observations, matrix, np.ravel(distortion)[:count], rotations, translations)
+
+    with _vendor_errors(cv2, observations):
+        found = least(pixels, matrix, distortion, flags)
+        if not _inside(found[1], observations.image_size):
+            return unpacked(found)  # OpenCV would not start from there again
+        flags |= cv2.CALIB_USE_INTRINSIC_GUESS
+        for _ in range(RESTARTS if count >= RATIONAL else 0):
+            again = least(pixels, found[1], found[2], flags)
+            if not again[0] < found[0]:
+                break
+            found = again
+        exact = observations.detections
+        lost = [p - d.pixels for p, d in zip(pixels, exact, strict=True)]
+        if not any(part.any() for part in lost):
+            return unpacked(found)
+        further = [(p + MAGNIFIED * part).astype(np.float32) for p, part in zip(pixels, lost, strict=True)]
+        return _without_rounding(unpacked(found), unpacked(least(further, found[1], found[2], flags)))
+
+
+def _inside(matrix: Any, image_size: tuple[int, int]) -> bool:
+    """Whether the principal point is in the image."""
+    return bool((matrix[:2, 2] >= 0).all() and (matrix[:2, 2] < image_size).all())
+
+
+def _without_rounding(rounded: Solution, further: Solution) -> Solution:
+    """Where OpenCV would end if it took pixels in double precision, to first order.
+
+    Rounding moves its answer by what it moves pixels. What moving them `MAGNIFIED` times as far again does is seen
+    above the rounding of the second answer's own pixels, and a part of it is what the first one was moved by.
+    """
+    params, translations = (one - (two - one) / MAGNIFIED for one, two in zip(rounded[::2], further[::2], strict=True))
+    first, second = rotation_matrices(rounded[1]), rotation_matrices(further[1])
+    back = rotation_matrices(-rotation_vectors(second @ first.transpose(0, 2, 1)) / MAGNIFIED)
+    return params, rotation_vectors(back @ first), translations
 
 
 def _solve_fisheye(observations: Observations, model: str, options: SolveOptions) -> Solution:
