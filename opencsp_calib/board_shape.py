@@ -38,7 +38,16 @@ from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.schur import factorise
 from opencsp_calib.uncertainty import jackknife_covariance, with_uncertainty
 
-__all__ = ["TURNED_DEG", "Run", "decide", "obstacle_to_shape", "roll_spread_deg", "solve_with_aspect"]
+__all__ = [
+    "TURNED_DEG",
+    "Evidence",
+    "Run",
+    "decide",
+    "evidence_of",
+    "obstacle_to_shape",
+    "roll_spread_deg",
+    "solve_with_aspect",
+]
 
 Run: TypeAlias = Callable[[Observations, SolveOptions], Calibration]
 
@@ -52,7 +61,7 @@ SIGMAS = 2.0  # a camera that moves by more has, by about 20 to 1, a bias that o
 
 
 @dataclass(frozen=True)
-class _Evidence:
+class Evidence:
     """What speaks for and against the board's shape, all rms over the image after aligning the frames.
 
     Parameters
@@ -69,9 +78,19 @@ class _Evidence:
     sigma_px: float
 
     @property
+    def by_halves(self) -> bool:
+        """Whether the halves agree clearly better with the shape."""
+        return CLEARLY * self.solved_halves_px < self.given_halves_px
+
+    @property
+    def by_move(self) -> bool:
+        """Whether solving for the shape moves the camera by more than chance."""
+        return self.moved_px > SIGMAS * self.sigma_px
+
+    @property
     def for_shape(self) -> bool:
-        by_halves = CLEARLY * self.solved_halves_px < self.given_halves_px
-        return by_halves or self.moved_px > SIGMAS * self.sigma_px
+        """Whether one of the two speaks for it."""
+        return self.by_halves or self.by_move
 
     def __str__(self) -> str:
         return (
@@ -112,7 +131,7 @@ def decide(observations: Observations, options: SolveOptions, run: Run, *, aspec
     assumed = () if aspect_given else _assumed_square(given.cam_from_board)
     shape = replace(shape, pixel_aspect=1.0) if assumed else shape
     try:
-        evidence = _evidence(given, shape)
+        evidence = evidence_of(given, shape)
         solved = _shape_solved(observations, replace(shape, guess=given.camera), run) if evidence.for_shape else given
     except (CalibError, np.linalg.LinAlgError) as error:
         message = f"the board was taken as it is given, because its shape could not be solved for: {error}"
@@ -207,8 +226,15 @@ def _shape_solved(observations: Observations, options: SolveOptions, run: Run) -
     return solved
 
 
-def _evidence(given: Calibration, shape: SolveOptions) -> _Evidence:
+def evidence_of(given: Calibration, shape: SolveOptions) -> Evidence:
     """What one Newton step towards the solution with the board's shape tells.
+
+    Parameters
+    ----------
+    given : Calibration
+        With the board as given.
+    shape : SolveOptions
+        With which the shape would be solved for.
 
     Raises
     ------
@@ -223,7 +249,7 @@ def _evidence(given: Calibration, shape: SolveOptions) -> _Evidence:
     solved = stepped(replace(given, camera=camera, options=shape))
     steps = (camera_without_each_view(factorise(normal_equations(one))) for one in (given, solved))
     by_chance = jackknife_covariance(np.subtract(*steps))
-    return _Evidence(
+    return Evidence(
         nearby_halves(given).rms_px,
         nearby_halves(solved).rms_px,
         compare(given.camera, solved.camera).rms_px,

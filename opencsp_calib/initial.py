@@ -142,8 +142,10 @@ class _PoseSearch:
         """(V, 3, 3) rotations and (V, 3) translations, of the board to the camera."""
         rays = np.nan_to_num(lens.unproject(self.pixels, params))
         across = np.eye(3) * (rays**2).sum(axis=1)[:, None, None] - rays[:, :, None] * rays[:, None, :]
-        products = across[:, :, None, :, None] * self.plane_squares[:, None, :, None, :]
-        sums = np.add.reduceat(products.reshape(-1, 9, 9), self.starts)
+        of_rays, of_plane = (np.split(part.reshape(-1, 9), self.starts[1:]) for part in (across, self.plane_squares))
+        products = np.array([rays.T @ plane for rays, plane in zip(of_rays, of_plane, strict=True)])
+        products = products.reshape(-1, 3, 3, 3, 3)
+        sums = products.transpose(0, 1, 3, 2, 4).reshape(-1, 9, 9)
         homographies = np.linalg.eigh(sums)[1][:, :, 0].reshape(-1, 3, 3)
         left, sizes, right = np.linalg.svd(homographies[:, :, :2], full_matrices=False)
         pairs = left @ right  # the orthonormal columns nearest to the first two

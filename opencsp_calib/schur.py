@@ -156,9 +156,13 @@ class CornersKept(Factorisation):
         """See `factorise`."""
         inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(equations.pose, damping)))
         corners = CORNER * len(equations.corner)
+        every, blocks = np.arange(len(equations.corner)), _damped(equations.corner, damping)
+        reduced = np.zeros((corners + equations.unknowns.shared,) * 2)
+        for row, column in np.ndindex(CORNER, CORNER):
+            reduced[row * len(every) + every, column * len(every) + every] = blocks[:, row, column]
         ties = equations.by_corner[:, CORNER:-1].transpose(0, 2, 1).reshape(corners, equations.unknowns.shared)
-        shared = _damped(equations.shared.sum(axis=0), damping)
-        reduced = np.block([[_by_coordinates(_damped(equations.corner, damping)), ties], [ties.T, shared]])
+        reduced[:corners, corners:], reduced[corners:, :corners] = ties, ties.T
+        reduced[corners:, corners:] = _damped(equations.shared.sum(axis=0), damping)
         for coupling in _couplings(equations, inverse_roots):
             reduced -= coupling.T @ coupling
         gauge = equations.gauge()[0].transpose(1, 0, 2).reshape(corners, 7)
@@ -217,22 +221,18 @@ def _block_diagonal(blocks: Floats) -> Matrix:
     return matrix.reshape(count * size, count * size)
 
 
-def _by_coordinates(blocks: Floats) -> Matrix:
-    """(3 C, 3 C) of the corners' blocks (C, 3, 3): x of all corners, then y, then z."""
-    every = np.arange(len(blocks))
-    matrix = np.zeros((CORNER, len(blocks), CORNER, len(blocks)))
-    matrix[:, every, :, every] = blocks
-    return matrix.reshape(CORNER * len(blocks), CORNER * len(blocks))
-
-
 def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
-    """Scale and lower Cholesky factor of a dense matrix, with the gauge's projector added; see `Factorisation`."""
+    """Scale and lower Cholesky factor of a dense matrix, with the gauge's projector added; see `Factorisation`.
+
+    The matrix is overwritten: it may be the largest thing in memory.
+    """
     diagonal = np.diag(dense)
     if not (diagonal > 0).all():
         raise np.linalg.LinAlgError("an unknown is not observed at all")
     scale = 1.0 / np.sqrt(diagonal)
-    scaled = dense * scale[:, None] * scale
+    dense *= scale[:, None]
+    dense *= scale
     if gauge.any():
         free, _ = np.linalg.qr(gauge / scale[: len(gauge), None])
-        scaled[: len(gauge), : len(gauge)] += free @ free.T
-    return scale, CholeskyRoot.of(scaled)
+        dense[: len(gauge), : len(gauge)] += free @ free.T
+    return scale, CholeskyRoot.of(dense)
