@@ -25,7 +25,7 @@ SMALLEST_STEP = 2.3e-16
 """OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
 up to 1e-8 px short. It has no test of the gradient."""
 
-RATIONAL, RESTARTS = 8, 10
+RATIONAL, RESTARTS = 8, 3
 """From so many coefficients on OpenCV stops short in the long valleys that those leave; from where it stopped it gets
 farther. A few starts are enough."""
 MAGNIFIED = 64.0  # times: what rounding moves, so that a new rounding is small beside it, and the curvature still too
