@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from opencsp_calib import Calibration, CalibrationFailedError, Checkerboard, Observations, Pose, SolveOptions
 from opencsp_calib.board_shape import decide, roll_spread_deg, solve_with_aspect
 from opencsp_calib.comparison import compare
+from opencsp_calib.newton import stepped
 from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses, seed_poses
 
@@ -69,6 +70,13 @@ def test_a_bias_that_both_halves_share_is_found_out() -> None:
         assert compare(flat.camera, CAMERA).rms_px > 5 * compare(free.camera, CAMERA).rms_px
         assert "board-shape-solved" in codes(decide(seen, OPTIONS, run))
     assert hidden > 0  # the case does occur
+
+
+def test_one_step_goes_nearly_all_the_way_to_the_solution_with_the_shape() -> None:
+    seen = world(12, bow_m=0.0005)
+    flat, free = run(seen, OPTIONS), run(seen, replace(OPTIONS, board_shape="free"))
+    moved = compare(flat.camera, free.camera).rms_px
+    assert compare(stepped(replace(flat, options=free.options)).camera, free.camera).rms_px < 0.01 * moved
 
 
 def test_what_stands_in_the_way_is_said() -> None:

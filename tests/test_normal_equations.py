@@ -253,6 +253,16 @@ def test_table_keeps_corners_with_their_views():
     np.testing.assert_array_equal(solvable_corners(table, 4001)[[0, -1]], [0, 3999])
 
 
+def test_a_thinned_table_has_some_corners_of_every_view():
+    table = CornerTable.of([Detection(np.arange(n), np.full((n, 2), n)) for n in (5, 0, 60, 4000)])
+    thinned = table.thinned(1000)
+    np.testing.assert_array_equal(thinned.counts[:3], [5, 0, 40])
+    assert 900 < thinned.counts[3] < 1100
+    assert set(thinned.pixels[thinned.view == 3, 0]) == {4000}
+    np.testing.assert_array_equal(table.thinned(1000).ids, thinned.ids)
+    assert table.thinned(5000) is table
+
+
 def test_held_aspect_moves_both_focal_lengths():
     unknowns = Unknowns.of(LENS_MODELS["opencv4"], BOARD, np.arange(0), SolveOptions(pixel_aspect=1.25))
     assert unknowns.camera.shape == (8, 7)
@@ -284,3 +294,18 @@ def test_root_solves_whatever_its_size():
         np.testing.assert_allclose(np.tril(root.lower) @ root.solve_lower(right), right, atol=1e-10)
     with pytest.raises(np.linalg.LinAlgError):
         CholeskyRoot.of(-np.eye(3))
+
+
+@pytest.mark.parametrize("views", [5, 14])
+def test_rows_that_are_made_again_are_those_that_would_have_been_kept(views, monkeypatch):
+    calibration = world(views, SolveOptions(board_shape="free", weights="covariance"))
+    kept = normal_equations(calibration)
+    monkeypatch.setattr("opencsp_calib.normal_equations.KEPT", 0)
+    again = normal_equations(calibration)
+    assert kept.kept_rows is not None
+    assert again.kept_rows is None
+    for one, other in zip(kept.rows(1, views), again.rows(1, views), strict=True):
+        assert one.view == other.view
+        np.testing.assert_array_equal(one.values, other.values)
+    for one, other in zip(*(factorise(e).solve(e.gradient) for e in (kept, again)), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
