@@ -25,6 +25,7 @@ SMALLEST_STEP = 2.3e-16
 """OpenCV stops where a step is smaller than this part of the parameters: at double precision, since the default stops
 up to 1e-8 px short. It has no test of the gradient."""
 
+TILTED = 14  # coefficients: OpenCV 5 stops anywhere in their valley, so that two answers tell nothing of rounding
 RATIONAL, RESTARTS = 8, 3
 """From so many coefficients on OpenCV stops short in the long valleys that those leave; from where it stopped it gets
 farther. A few starts are enough."""
@@ -91,8 +92,8 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
 
     with _vendor_errors(cv2, observations):
         found = least(pixels, matrix, distortion, flags)
-        if not _inside(found[1], observations.image_size):
-            return unpacked(found)  # OpenCV would not start from there again
+        if count >= TILTED or not _inside(found[1], observations.image_size):
+            return unpacked(found)  # OpenCV does not find the least there, or would not start from there again
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
         for _ in range(RESTARTS if count >= RATIONAL else 0):
             again = least(pixels, found[1], found[2], flags)
