@@ -14,6 +14,7 @@ import h5py
 from opencsp_calib import Camera
 from opencsp_calib.cli import run
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that started the tests aside has them ignore it
 camera = Camera("left", "opencv4", [2700, 2700, 830, 630, -0.2, 0.1, 0, 0], (1626, 1236))
 written = h5py.Group.create_dataset
 
