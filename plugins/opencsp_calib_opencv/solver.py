@@ -92,7 +92,7 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
 
     with _vendor_errors(cv2, observations):
         found = least(pixels, matrix, distortion, flags)
-        if count >= TILTED or not _inside(found[1], observations.image_size):
+        if count >= TILTED or not _can_start(found[1], observations.image_size):
             return unpacked(found)  # OpenCV does not find the least there, or would not start from there again
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
         for _ in range(RESTARTS if count >= RATIONAL else 0):
@@ -108,9 +108,10 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
         return _without_rounding(unpacked(found), unpacked(least(further, found[1], found[2], flags)))
 
 
-def _inside(matrix: Any, image_size: tuple[int, int]) -> bool:
-    """Whether the principal point is in the image."""
-    return bool((matrix[:2, 2] >= 0).all() and (matrix[:2, 2] < image_size).all())
+def _can_start(matrix: Any, image_size: tuple[int, int]) -> bool:
+    """Whether OpenCV would take it as a start: focal lengths positive, the principal point in the image."""
+    focal, middle = matrix.diagonal()[:2], matrix[:2, 2]
+    return bool((focal > 0).all() and (middle >= 0).all() and (middle < image_size).all())
 
 
 def _without_rounding(rounded: Solution, further: Solution) -> Solution:
