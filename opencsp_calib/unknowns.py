@@ -117,5 +117,5 @@ def warp_basis(board: Board) -> Floats:
     basis = np.array(shifts).transpose(2, 1, 0).reshape(-1, len(shifts))
     turns = np.cross(np.eye(3)[:, None, :], place).reshape(3, -1).T
     similarity = np.column_stack([np.tile(np.eye(3), (len(place), 1)), turns, place.ravel()])
-    basis -= similarity @ np.linalg.lstsq(similarity, basis)[0]
+    basis -= similarity @ np.linalg.lstsq(similarity, basis, rcond=None)[0]
     return np.asarray(basis.reshape(len(place), 3, len(shifts)), dtype=np.float64)
