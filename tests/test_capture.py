@@ -241,7 +241,7 @@ def wait_for(process: subprocess.Popen, words: str) -> str:
 
 @pytest.mark.skipif(os.name != "posix", reason="kills with a signal")
 def test_killed_in_the_middle_it_has_lost_nothing_and_goes_on(incoming, tmp_path):
-    with started(tmp_path / "set", incoming, "--release", "interval:0.3") as process:
+    with started(tmp_path / "set", incoming, "--release", "interval:0") as process:
         wait_for(process, "0003.png: 3 of 50")
         process.send_signal(signal.SIGKILL)
     images = sorted((tmp_path / "set").glob("[0-9]*.png"))
