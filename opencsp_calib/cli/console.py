@@ -30,13 +30,14 @@ __all__ = [
 
 MAX_NAMED = 8  # images in one line
 PIPED_WIDTH = 200  # of a table in a file or pipe, which has no width of its own
+CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")  # a terminal obeys them, wherever they come from
 NUMBER = re.compile(r"[-+±]?[\d.]|nan|inf|-?$")  # how a cell of a column of numbers begins
 
 
 def say(text: str) -> None:
     """A line for people; nobody is told where standard error is closed, or on a full disk."""
     with contextlib.suppress(OSError):
-        _console().print(text)
+        _console().print(_visible(text))
 
 
 def complain(text: str) -> None:
@@ -66,7 +67,7 @@ def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
         numbers = index > 0 and all(NUMBER.match(row[index]) for row in rows)
         table.add_column(title, justify="right" if numbers else "left", no_wrap=index == 0, overflow="fold")
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(_visible, row))
     with contextlib.suppress(OSError):
         console.print(table, soft_wrap=False)
 
@@ -108,6 +109,11 @@ def say_unused(observations: "Observations") -> None:
     for (status, reason), images in by_reason.items():
         more = f" and {len(images) - MAX_NAMED} more" if len(images) > MAX_NAMED else ""
         say(f"{', '.join(images[:MAX_NAMED])}{more}: {status}: {reason}")
+
+
+def _visible(text: str) -> str:
+    """With control characters, as file names may have them, spelled out."""
+    return CONTROLS.sub(lambda found: f"\\x{ord(found[0]):02x}", text)
 
 
 def _console() -> "Console":
