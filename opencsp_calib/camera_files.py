@@ -1,6 +1,7 @@
 """Camera files of any format, as people handle them: open, convert exactly or by a fit, write, undistort with one."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
@@ -37,6 +38,7 @@ class CameraFile:
 
     Parameters
     ----------
+    path : Path
     name : str
         The file's own name for the camera.
     imported : Imported
@@ -46,6 +48,7 @@ class CameraFile:
         The notes kept with it.
     """
 
+    path: Path
     name: str
     imported: Imported
     calibration: Calibration | None = field(repr=False)
@@ -54,7 +57,8 @@ class CameraFile:
     @property
     def camera(self) -> Camera:
         """The camera; raises NotExactError where it is not exactly one of our lens models."""
-        return exact(self.imported)
+        with _naming(self.path):
+            return exact(self.imported)
 
 
 @dataclass(frozen=True)
@@ -103,12 +107,13 @@ def read_camera_file(
         As `importing.read_cameras` and `importing.pick`.
     """
     cameras = read_cameras(path, installed().camera_formats, image_size_from(image_size), format_name)
-    key, imported = pick(cameras, None if where_several and len(cameras) == 1 else name)
+    with _naming(path):
+        key, imported = pick(cameras, None if where_several and len(cameras) == 1 else name)
     try:
         record = load_record(path)
     except FileFormatError:  # not one of ours: it has no record
         record = {}
-    return CameraFile(key, imported, calibration_in(path), record)
+    return CameraFile(Path(path), key, imported, calibration_in(path), record)
 
 
 def calibration_in(path: str | PathLike[str]) -> Calibration | None:
@@ -144,9 +149,19 @@ def convert(
         camera = file.camera
         return Converted(replace(camera, name=name) if name else camera, record)
     accepted = {} if accept_error_px is None else {"accept_error_px": accept_error_px}
-    found = fitted(file.imported, fit, name=name or file.name, **accepted)
+    with _naming(file.path):
+        found = fitted(file.imported, fit, name=name or file.name, **accepted)
     record["import fit"] = f"{fit}, {found}"
     return Converted(found.camera, record, found)
+
+
+@contextmanager
+def _naming(path: str | PathLike[str]) -> Iterator[None]:
+    """Have what goes wrong tell with which file: a command may read several."""
+    try:
+        yield
+    except InputError as error:
+        raise type(error)(f"{path}: {error}") from None
 
 
 def image_size_from(text: str | None) -> tuple[int, int] | None:

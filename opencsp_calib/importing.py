@@ -193,7 +193,7 @@ def pick(cameras: Mapping[str, Imported], name: str | None = None) -> tuple[str,
     listed += f" ... ({len(cameras)} in all)" if len(cameras) > MAX_LISTED else ""
     if name is not None:
         if name not in cameras:
-            raise InputError(f"no camera is called {name!r} in this file; it has {listed}")
+            raise InputError(f"no camera is called {name!r} in the file; it has {listed}")
         return name, cameras[name]
     if len(cameras) != 1:
         notes = dict.fromkeys(n.message for i in cameras.values() for n in i.notes if n.code == "ambiguous-model")

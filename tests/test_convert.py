@@ -206,3 +206,10 @@ def test_outputs_that_are_closed_or_full_and_an_empty_environment(closed: str, t
     done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
     assert "Traceback" not in done.stderr
     assert done.returncode == (2 if closed.startswith(">") else 0)
+
+
+def test_of_two_files_it_says_which(stereo: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = tmp_path / "good.h5"
+    command("convert", stereo, good, "--camera", "left", "--fit", "opencv5", "--accept-error", 5)
+    command("compare", good, stereo, code=2)
+    assert f"error: {stereo}: the file has 2 cameras" in capsys.readouterr().err

@@ -107,7 +107,7 @@ def test_pick() -> None:
     assert pick(cameras, "right") == ("right", SIZELESS)
     with pytest.raises(InputError, match=r"has 2 cameras; choose one with --camera: left, right$"):
         pick(cameras)
-    with pytest.raises(InputError, match="no camera is called 'middle' in this file; it has left, right"):
+    with pytest.raises(InputError, match="no camera is called 'middle' in the file; it has left, right"):
         pick(cameras, "middle")
     with pytest.raises(InputError, match=r"100 cameras.* 19 \.\.\. \(100 in all\)$"):
         pick({str(i): SIZED for i in range(100)})
