@@ -66,9 +66,25 @@ class CornerTable:
 
     def keeping(self, mask: Mask) -> "CornerTable":
         """Only the corners where the mask (N,) is true; a view may be left with none."""
+        if mask.all():
+            return self
         first = np.concatenate([[0], np.cumsum(mask)])[self.first].astype(np.int64)
         whitening = None if self.whitening is None else self.whitening[mask]
         return CornerTable(self.ids[mask], self.pixels[mask], first, whitening)
+
+    def in_views(self, views: slice) -> Mask:
+        """(N,) which corners are of the views that a slice takes."""
+        taken = np.zeros(len(self.counts), dtype=np.bool_)
+        taken[views] = True
+        return taken[self.view]
+
+    def of_views(self, views: slice) -> "CornerTable":
+        """Only the views that a slice takes, in the order they are in."""
+        mask = self.in_views(views)
+        first = np.concatenate([[0], np.cumsum(self.counts[views])]).astype(np.int64)
+        return CornerTable(
+            self.ids[mask], self.pixels[mask], first, None if self.whitening is None else self.whitening[mask]
+        )
 
     def thinned(self, count: int) -> "CornerTable":
         """About as many corners, some of every view: the same share of each, but at least `LEAST` where it has them.

@@ -4,18 +4,20 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.jacobian import CORNER, ViewRows
-from opencsp_calib.normal_equations import NormalEquations
+from opencsp_calib.normal_equations import NormalEquations, Parts
 from opencsp_calib.schur import Factorisation
 from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["camera_without_each_view"]
 
-CG_TOLERANCE = 1e-6  # of the step's length, in sigmas
+CG_TOLERANCE = 1e-6  # of each step's length in sigmas
 CG_STEPS = 200
 TOGETHER = 2**16  # numbers: as many views are left out at once as have so many unknowns
 
 
-def camera_without_each_view(whole: Factorisation) -> Floats:
+def camera_without_each_view(
+    whole: Factorisation, *, ahead: Parts | None = None, tolerance: float = CG_TOLERANCE
+) -> Floats:
     """How the camera's parameters move when each view in turn is left out.
 
     Where the board's shape is free, many left-out views are solved for at once by conjugate gradients that start from
@@ -25,6 +27,10 @@ def camera_without_each_view(whole: Factorisation) -> Floats:
     ----------
     whole : Factorisation
         Of all views, not damped.
+    ahead : Parts, optional
+        The step that all views together ask for; none where they are at their minimum.
+    tolerance : float
+        What may be missing of each step, as a part of its length in sigmas, where it is iterated for.
 
     Returns
     -------
@@ -32,8 +38,11 @@ def camera_without_each_view(whole: Factorisation) -> Floats:
         Parameters without the view minus those with it; NaN where the others do not determine them.
     """
     unknowns = whole.equations.unknowns
-    steps = _by_iteration(whole) if len(unknowns.corners) else _directly(whole.equations)
-    return np.asarray(steps[:, : unknowns.camera.shape[1]] @ unknowns.camera.T)
+    if not len(unknowns.corners):
+        found = _directly(whole.equations)
+        return unknowns.of_camera(found if ahead is None else found - ahead[0])
+    start = None if ahead is None else np.concatenate([ahead[0], ahead[1].T.ravel()])
+    return unknowns.of_camera(_by_iteration(whole, start, tolerance))
 
 
 def _directly(equations: NormalEquations) -> Floats:
@@ -56,23 +65,27 @@ def _directly(equations: NormalEquations) -> Floats:
     return steps
 
 
-def _by_iteration(whole: Factorisation) -> Floats:
-    """(V, M)."""
+def _by_iteration(whole: Factorisation, ahead: Floats | None, tolerance: float) -> Floats:
+    """(V, M); see `_without`."""
     unknowns = whole.equations.unknowns
     inverse_pose = np.asarray(np.linalg.inv(whole.equations.pose), dtype=np.float64)
     views, size = len(inverse_pose), unknowns.shared + CORNER * len(unknowns.corners)
     together = max(1, TOGETHER // size)
     runs = [(begin, min(begin + together, views)) for begin in range(0, views, together)]
-    return np.concatenate([_without(whole, inverse_pose, run) for run in runs])[:, : unknowns.shared]
+    return np.concatenate([_without(whole, inverse_pose, run, ahead, tolerance) for run in runs])[:, : unknowns.shared]
 
 
-def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int]) -> Floats:
+def _without(
+    whole: Factorisation, inverse_pose: Floats, views: tuple[int, int], ahead: Floats | None, tolerance: float
+) -> Floats:
     """(n, M + 3 C) of a run of views: preconditioned conjugate gradients on S - S_v, S being factored, S_v of one view.
 
     Both with the poses eliminated. The product of S with the search direction follows from the recurrence, so S itself
-    is never needed. Both are singular in the directions of the gauge, which right-hand sides have no part in.
+    is never needed. Both are singular in the directions of the gauge, which right-hand sides have no part in. Steps
+    are counted from where the step `ahead` (M + 3 C,) leads.
     """
-    right = _of_views(whole.equations, inverse_pose, views, None)
+    start_from = None if ahead is None else np.broadcast_to(ahead, (views[1] - views[0], len(ahead)))
+    right = _of_views(whole.equations, inverse_pose, views, start_from, residual=True)
     x, residual = np.zeros_like(right), right.copy()
     direction, whole_direction = np.zeros_like(right), np.zeros_like(right)
     before = np.ones(len(right))
@@ -81,7 +94,7 @@ def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int])
         now = np.einsum("vi,vi->v", residual, preconditioned)
         if step == 0:
             start = now.copy()
-        active = now > CG_TOLERANCE**2 * start
+        active = now > tolerance**2 * start
         if not active.any():
             break
         factor = np.where(active, now / before, 0.0) if step else np.zeros_like(now)
@@ -97,12 +110,21 @@ def _without(whole: Factorisation, inverse_pose: Floats, views: tuple[int, int])
     return x
 
 
-def _of_views(equations: NormalEquations, inverse_pose: Floats, views: tuple[int, int], x: Floats | None) -> Floats:
-    """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own; or its gradient."""
+def _of_views(
+    equations: NormalEquations,
+    inverse_pose: Floats,
+    views: tuple[int, int],
+    x: Floats | None,
+    *,
+    residual: bool = False,
+) -> Floats:
+    """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own, or plus its gradient."""
     shared, corners = equations.unknowns.shared, len(equations.unknowns.corners)
     products = np.zeros((views[1] - views[0], shared + CORNER * corners))
     for rows in equations.rows(*views):
-        moved = rows.residual if x is None else _moved(rows, x[rows.view - views[0]], shared)
+        moved = rows.residual if residual else np.zeros_like(rows.residual)
+        if x is not None:
+            moved = moved + _moved(rows, x[rows.view - views[0]], shared)
         turned = (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
         moved = moved - (inverse_pose[rows.view] @ turned) @ rows.pose
         product = products[rows.view - views[0]]

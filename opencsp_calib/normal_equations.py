@@ -40,7 +40,6 @@ __all__ = [
 
 TOLD_APART = 1e-8  # smallest eigenvalue of the camera's scaled information, poses held, that leaves enough digits
 ROUNDING = 1e-15  # below this an eigenvalue is made of it
-ALL = slice(None)
 KEPT = 32768  # corners: of so many, rows of J are kept (10 MB); of more, they are made again when they are needed
 
 Parts: TypeAlias = tuple[Floats, Floats, Floats]
@@ -147,6 +146,29 @@ class NormalEquations:
             values = self.kept_rows[:, :, self.table.span(begin, end)]
             yield from split_by_view(self.table, self.unknowns, (begin, end), values)
 
+    def keeping(self, views: slice) -> "NormalEquations":
+        """Those of some of the views alone, linearised at the same place.
+
+        Where the board's shape is free, without corners that fewer than two of these views see.
+
+        Parameters
+        ----------
+        views : slice
+            In the order they are in.
+        """
+        of_views = self.table.in_views(views)
+        table, estimate, unknowns = self.table.of_views(views), self.estimate.of_views(views), self.unknowns
+        if not len(unknowns.corners):
+            return replace(self, table=table, estimate=estimate, dense=self.dense[views])
+        seen = solvable_corners(table, len(estimate.points))
+        if self.kept_rows is None or len(seen) < len(unknowns.corners):
+            fewer = replace(unknowns, corners=seen)
+            return linearise(self.lens, table.keeping(np.isin(table.ids, seen)), estimate, fewer)
+        kept, by_corner = self.kept_rows.compress(of_views, axis=2), np.zeros_like(self.by_corner)
+        for rows in split_by_view(table, unknowns, (0, len(table.counts)), kept):
+            _add_by_corner(by_corner, rows)
+        return NormalEquations(self.lens, table, estimate, unknowns, self.dense[views], by_corner, kept)
+
     def gauge(self) -> tuple[Floats, Floats]:
         """The steps that change no projection, (C, 3, 7) and (V, 6, 7); all zero where no corner is solved for.
 
@@ -167,13 +189,13 @@ class NormalEquations:
         return corner_gauge, pose_gauge
 
 
-def normal_equations(calibration: Calibration, views: slice = ALL) -> NormalEquations:
-    """The normal equations of any solver's calibration, at its solution, without its outliers; maybe of some views.
+def normal_equations(calibration: Calibration) -> NormalEquations:
+    """The normal equations of any solver's calibration, at its solution, without its outliers.
 
     What was solved for and how corners were weighted is taken from its options. Where the board's shape is free,
     corners seen in one view only tell nothing about the camera and are left out.
     """
-    seen = zip(calibration.observations.detections[views], calibration.outliers[views], strict=True)
+    seen = zip(calibration.observations.detections, calibration.outliers, strict=True)
     detections = [detection.keeping(~outliers) if outliers.any() else detection for detection, outliers in seen]
     table = CornerTable.of(detections, calibration.options.weights)
     corners = solvable_corners(table, len(calibration.board.points))
@@ -181,7 +203,7 @@ def normal_equations(calibration: Calibration, views: slice = ALL) -> NormalEqua
     unknowns = Unknowns.of(camera.lens, calibration.observations.board, corners, calibration.options)
     if len(unknowns.corners):
         table = table.keeping(np.isin(table.ids, corners))
-    estimate = Estimate.of(calibration, views)
+    estimate = Estimate.of(calibration)
     equations = linearise(camera.lens, table, estimate, unknowns)
     conditioned = well_conditioned(equations)
     return equations if conditioned is unknowns else linearise(camera.lens, table, estimate, conditioned)
@@ -222,5 +244,9 @@ def linearise(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns:
         first, second = rows.values[:, CORNER if corners else 0 :]
         dense[rows.view] = first @ first.T + second @ second.T
         if corners:
-            by_corner[:, :, rows.columns] += np.einsum("ain,ajn->ijn", rows.corner, rows.values[:, :-POSE])
+            _add_by_corner(by_corner, rows)
     return NormalEquations(lens, table, estimate, unknowns, dense, by_corner, kept)
+
+
+def _add_by_corner(by_corner: Floats, rows: ViewRows) -> None:
+    by_corner[:, :, rows.columns] += np.einsum("ain,ajn->ijn", rows.corner, rows.values[:, :-POSE])

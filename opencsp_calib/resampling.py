@@ -11,11 +11,10 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibrationFailedError, InputError
-from opencsp_calib.normal_equations import normal_equations
+from opencsp_calib.normal_equations import NormalEquations, normal_equations
 from opencsp_calib.pose_fit import pose_residuals
 from opencsp_calib.schur import factorise
 
@@ -25,6 +24,7 @@ __all__ = [
     "Solve",
     "compare_halves",
     "folds",
+    "half_steps",
     "halves",
     "held_out",
     "known_corners",
@@ -135,11 +135,24 @@ def nearby_halves(calibration: Calibration, *, range_m: float | None = None) -> 
         If a half does not determine the camera.
     """
     halves(calibration.observations)  # refused where there are too few views
+    camera = calibration.camera
+    first, second = (replace(camera, params=camera.params + step) for step in half_steps(normal_equations(calibration)))
+    return compare(first, second, range_m=range_m)
+
+
+def half_steps(equations: NormalEquations) -> Floats:
+    """(2, P) how the odd and the even views, each alone, would move the camera, poses and board moving with it.
+
+    Raises
+    ------
+    CalibrationFailedError
+        If a half does not determine the camera.
+    """
     try:
-        first, second = (_camera_of(calibration, half) for half in HALVES)
+        shared = [factorise(equations.keeping(half)).newton_step()[0] for half in HALVES]
     except np.linalg.LinAlgError as error:
         raise CalibrationFailedError(f"half of the views do not determine the camera ({error})") from None
-    return compare(first, second, range_m=range_m)
+    return equations.unknowns.of_camera(np.array(shared))
 
 
 def held_out(pairs: tuple[tuple[Observations, Observations], ...], solve: Solve) -> HeldOut:
@@ -178,12 +191,3 @@ def known_corners(calibration: Calibration) -> Mask:
     detections = zip(calibration.observations.detections, calibration.outliers, strict=True)
     ids = np.concatenate([detection.ids[~outliers] for detection, outliers in detections])
     return np.asarray(np.bincount(ids, minlength=count) >= 2)
-
-
-def _camera_of(calibration: Calibration, views: slice) -> Camera:
-    """The camera one Newton step nearer to what some of the views ask for, poses and board moving with it."""
-    equations = normal_equations(calibration, views)
-    shared = factorise(equations).solve(equations.gradient)[0]
-    basis = equations.unknowns.camera
-    camera = calibration.camera
-    return replace(camera, params=camera.params - basis @ shared[: basis.shape[1]])

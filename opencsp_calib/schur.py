@@ -63,6 +63,11 @@ class Factorisation(ABC):
         cameras = basis.shape[1]
         return np.asarray(basis @ self.shared_covariance[:cameras, :cameras] @ basis.T)
 
+    def newton_step(self) -> Parts:
+        """By how much the unknowns move to where the sum of squares is least, as far as it is a quadratic form."""
+        shared, corner, pose = self.solve(self.equations.gradient)
+        return -shared, -corner, -pose
+
     @abstractmethod
     def solve(self, right: Parts) -> Parts:
         """The solution for a right-hand side."""

@@ -1,6 +1,6 @@
 """What a calibration solves for, and the values it has reached."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -35,9 +35,9 @@ class Estimate:
     points: Points
 
     @classmethod
-    def of(cls, calibration: Calibration, views: slice = slice(None)) -> "Estimate":
-        """A calibration's values, maybe of some views."""
-        poses = calibration.cam_from_board[views]
+    def of(cls, calibration: Calibration) -> "Estimate":
+        """A calibration's values."""
+        poses = calibration.cam_from_board
         return cls(
             calibration.camera.params,
             rotation_matrices(np.array([p.rotation for p in poses]).reshape(-1, 3)),
@@ -51,13 +51,17 @@ class Estimate:
         vectors = rotation_vectors(self.rotations)
         return tuple(Pose(r, t) for r, t in zip(vectors, self.translations, strict=True))
 
+    def of_views(self, views: slice) -> "Estimate":
+        """With the poses of some views only."""
+        return replace(self, rotations=self.rotations[views], translations=self.translations[views])
+
     def moved(self, unknowns: "Unknowns", shared: Floats, corner: Floats, pose: Floats) -> "Estimate":
         """After a step of the unknowns: (M,), (C, 3) m and (V, 6)."""
         cameras = unknowns.camera.shape[1]
         points = self.points + unknowns.warp @ shared[cameras:]
         points[unknowns.corners] += corner
         return Estimate(
-            self.params + unknowns.camera @ shared[:cameras],
+            self.params + unknowns.of_camera(shared),
             rotation_matrices(pose[:, :3]) @ self.rotations,
             self.translations + pose[:, 3:],
             points,
@@ -95,6 +99,10 @@ class Unknowns:
         warp = warp_basis(board) if options.board_shape == "warp" else np.zeros((count, 3, 0))
         free = options.board_shape == "free"
         return cls(camera, warp, corners if free else np.empty(0, dtype=np.int64))
+
+    def of_camera(self, shared: Floats) -> Params:
+        """(..., P) how the camera's parameters change with a change (..., M) of the shared unknowns."""
+        return np.asarray(shared[..., : self.camera.shape[1]] @ self.camera.T)
 
     @property
     def shared(self) -> int:

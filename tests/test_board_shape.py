@@ -10,8 +10,6 @@ from scipy.spatial.transform import Rotation
 from opencsp_calib import Calibration, CalibrationFailedError, Checkerboard, Observations, Pose, SolveOptions
 from opencsp_calib.board_shape import decide, roll_spread_deg, solve_with_aspect
 from opencsp_calib.comparison import compare
-from opencsp_calib.newton import stepped
-from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses, seed_poses
 
 BOARD = Checkerboard(9, 6, 0.1)
@@ -50,33 +48,19 @@ def test_a_bent_board_is_solved_for_and_the_camera_is_right(views: int) -> None:
 
 def test_a_flat_board_is_mostly_taken_as_it_is_and_else_no_harm_is_done() -> None:
     kept, decided, plain = 0, [], []
+
+    def noted(observations: Observations, options: SolveOptions) -> Calibration:
+        found = run(observations, options)
+        if options.board_shape == "flat":
+            plain.append(compare(found.camera, CAMERA).rms_px)
+        return found
+
     for seed in range(8):
-        seen = world(10, seed=seed)
-        found = decide(seen, OPTIONS, run)
+        found = decide(world(10, seed=seed), OPTIONS, noted)
         kept += "board-as-given" in codes(found)
         decided.append(compare(found.camera, CAMERA).rms_px)
-        plain.append(compare(run(seen, OPTIONS).camera, CAMERA).rms_px)
     assert kept >= 5
     assert np.median(decided) < 1.5 * np.median(plain)
-
-
-def test_a_bias_that_both_halves_share_is_found_out() -> None:
-    """A slight bow under much noise: the halves agree better with a flat board, and both are wrong by the same."""
-    hidden = 0
-    for seed in range(4):
-        seen = world(20, bow_m=0.0005, noise_px=0.1, seed=seed)
-        flat, free = run(seen, OPTIONS), run(seen, replace(OPTIONS, board_shape="free"))
-        hidden += nearby_halves(flat).rms_px < nearby_halves(free).rms_px
-        assert compare(flat.camera, CAMERA).rms_px > 5 * compare(free.camera, CAMERA).rms_px
-        assert "board-shape-solved" in codes(decide(seen, OPTIONS, run))
-    assert hidden > 0  # the case does occur
-
-
-def test_one_step_goes_nearly_all_the_way_to_the_solution_with_the_shape() -> None:
-    seen = world(12, bow_m=0.0005)
-    flat, free = run(seen, OPTIONS), run(seen, replace(OPTIONS, board_shape="free"))
-    moved = compare(flat.camera, free.camera).rms_px
-    assert compare(stepped(replace(flat, options=free.options)).camera, free.camera).rms_px < 0.01 * moved
 
 
 def test_what_stands_in_the_way_is_said() -> None:

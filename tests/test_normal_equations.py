@@ -182,6 +182,51 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
         assert np.abs((step - expected) / sigma).max() < 1e-5
 
 
+@pytest.mark.parametrize("shape", ["flat", "free"])
+def test_views_left_out_away_from_the_minimum_are_counted_from_where_all_lead(shape):
+    equations = Dense(world(12, SolveOptions(board_shape=shape))).equations
+    whole = factorise(equations)
+    ahead = whole.newton_step()
+    sigma = np.sqrt(np.diag(whole.camera_covariance))
+    found = camera_without_each_view(whole, ahead=ahead)
+    assert np.abs(camera_without_each_view(whole, ahead=ahead, tolerance=1e-2) / sigma - found / sigma).max() < 1e-2
+    for view in (0, 7):
+        rest = np.arange(12) != view
+        table = equations.table.keeping(rest[equations.table.view])
+        table = replace(table, first=np.delete(table.first, view + 1))
+        estimate = equations.estimate
+        part = replace(estimate, rotations=estimate.rotations[rest], translations=estimate.translations[rest])
+        step = factorise(linearise(equations.lens, table, part, equations.unknowns)).newton_step()
+        expected = equations.unknowns.of_camera(step[0] - ahead[0])
+        assert np.abs((found[view] - expected) / sigma).max() < 1e-5
+
+
+@pytest.mark.parametrize("kept", [True, False])
+@pytest.mark.parametrize("shape", ["flat", "warp", "free"])
+def test_those_of_some_views_are_those_of_a_calibration_of_them(shape, kept, monkeypatch):
+    if not kept:
+        monkeypatch.setattr("opencsp_calib.normal_equations.KEPT", 0)
+    whole = world(12, SolveOptions(board_shape=shape, weights="covariance"))
+    for views in (slice(0, None, 2), slice(1, 3)):  # of two views, many corners are seen once
+        images = [view.image for view in whole.observations.used[views]]
+        alone = Calibration(
+            whole.camera,
+            whole.observations.keeping(images),
+            whole.cam_from_board[views],
+            whole.board,
+            "truth",
+            whole.options,
+        )
+        found, expected = normal_equations(whole).keeping(views), normal_equations(alone)
+        assert (found.numbers, found.dof) == (expected.numbers, expected.dof)
+        np.testing.assert_array_equal(found.unknowns.corners, expected.unknowns.corners)
+        for name in ("dense", "by_corner"):
+            one, other = getattr(found, name), getattr(expected, name)
+            np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9 * np.abs(other).max(initial=0.0))
+        rows, others = (np.concatenate([r.values for r in e.rows()] or [[]], axis=-1) for e in (found, expected))
+        np.testing.assert_allclose(rows, others, rtol=1e-9, atol=1e-9)
+
+
 def test_gauge_steps_change_nothing_that_is_seen():
     dense = Dense(world(4, SolveOptions(board_shape="free")))
     e = dense.equations

@@ -23,8 +23,9 @@ from opencsp_calib_bundle.solver import BundleSolver
 
 from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions
 from opencsp_calib.blas import blas_on_one_thread
-from opencsp_calib.board_shape import decide, evidence_of
+from opencsp_calib.board_shape import decide
 from opencsp_calib.comparison import compare
+from opencsp_calib.shape_evidence import evidence_of
 from opencsp_calib.synthetic import bowed, demo_camera, observe, seed_poses
 from opencsp_calib.uncertainty import with_uncertainty
 
