@@ -126,6 +126,7 @@ class Capture:
                     show(state)
                     if self._is_over(state):
                         break
+                self._delete_if_asked()  # while the last frame was looked at
             return self._learner.wait() if self._learner else None
         finally:
             if self._learner:
@@ -141,9 +142,7 @@ class Capture:
         if image.size != expected:
             sizes = " but those before were ".join("x".join(map(str, size)) for size in (image.size, expected))
             raise InputError(f"the images are {sizes}: the camera's region or binning has changed; use another folder")
-        if self._deleting.is_set():
-            self._deleting.clear()
-            self._delete_last(learner)
+        self._delete_if_asked()
         moment = judge_moment(self._preview.look(image), self._known(learner), self._places)
         new = self._photographed(image, moment, learner) if self._is_due(image, moment) else ""
         return State(moment, learner.knowledge, len(self.folder.images), self.count, new)
@@ -178,7 +177,10 @@ class Capture:
             self._places = [view.detection for view in learner.wait().views]
         return learner
 
-    def _delete_last(self, learner: Learner) -> None:
+    def _delete_if_asked(self) -> None:
+        if self._learner is None or not self._deleting.is_set():
+            return
+        self._deleting.clear()
         if self.folder.remove_last() and self._places:
             self._places.pop()
-        learner.know(self.folder.images)
+        self._learner.know(self.folder.images)
