@@ -180,7 +180,7 @@ def incoming(tmp_path_factory, world) -> Path:
 
 
 def capture(folder: Path, incoming: Path, *more: str) -> int:
-    options = ["--source", "folder", "--device", str(incoming), "--set", "wait=0.3", *more]
+    options = ["--source", "folder", "--device", str(incoming), "--set", "wait=0", *more]
     return run(["capture", str(folder), "--board", SPEC, *options])
 
 
@@ -267,7 +267,7 @@ def test_keys_release_delete_and_stop(world, tmp_path):
                 return
 
     camera = threading.Thread(target=deliver)
-    with started(tmp_path / "set", incoming, "--release", "manual", "--set", "wait=60") as process:
+    with started(tmp_path / "set", incoming, "--release", "manual", "--set", "wait=300") as process:
         camera.start()
         try:
             for number, key in enumerate((" ", "\n", " "), start=1):

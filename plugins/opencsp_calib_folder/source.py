@@ -24,7 +24,7 @@ class FolderSource:
     """A folder, by its path, that a camera's own program or a person puts photographs into.
 
     Images that are there come first, in natural order; then each new one as soon as it is whole. None is left out. It
-    ends when nothing new has come for a minute, or for the seconds of the setting ``wait``.
+    ends when no file is half written and nothing new has come for a minute, or for the seconds of the setting ``wait``.
     """
 
     name = "folder"
@@ -63,18 +63,17 @@ def _images(folder: Path, wait_s: float) -> Iterator[Image]:
     done: set[Path] = set()
     growing: dict[Path, Growing] = {}
     last = time.monotonic()
-    while time.monotonic() - last <= wait_s:
-        for path in images_in(folder):
-            if path in done:
-                continue
-            file = growing.setdefault(path, Growing(path))
+    while True:
+        growing = {path: growing.get(path) or Growing(path) for path in images_in(folder) if path not in done}
+        for path, file in growing.items():
             image = file.whole_image()
             if image is not None:
                 yield image
             if image is not None or file.given_up:
-                del growing[path]
                 done.add(path)
                 last = time.monotonic()
+        if growing.keys() <= done and time.monotonic() - last >= wait_s:
+            break
         time.sleep(POLL_S)
     log.info("no new image in %s for %g s", folder, wait_s)
 

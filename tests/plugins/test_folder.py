@@ -33,11 +33,12 @@ def levels(images):
 
 def test_what_is_there_comes_in_natural_order_and_it_ends_when_nothing_new_comes(folder):
     (folder / "notes.txt").write_text("no image")
-    with FolderSource().open(str(folder), wait="0.2") as images:
+    with FolderSource().open(str(folder), wait="0") as images:
         assert levels(images) == [1, 2, 10]
 
 
-def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path):
+def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path, monkeypatch):
+    monkeypatch.setattr("opencsp_calib_folder.source.GIVEN_UP_S", 300)  # however long the other program is kept waiting
     write_image(np.full((60, 80), 7, dtype=np.uint8), tmp_path / "other.png")
     data = (tmp_path / "other.png").read_bytes()
 
@@ -48,7 +49,7 @@ def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path):
             time.sleep(0.5)
             file.write(data[len(data) // 2 :])
 
-    with FolderSource().open(str(tmp_path), wait=30) as images:
+    with FolderSource().open(str(tmp_path), wait=300) as images:
         assert levels(islice(images, 1)) == [7]
         writer = threading.Thread(target=another_program)
         writer.start()
@@ -60,7 +61,7 @@ def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path):
 def test_a_file_that_is_no_image_is_left_out(tmp_path, monkeypatch, caplog):
     monkeypatch.setattr("opencsp_calib_folder.source.GIVEN_UP_S", 0.2)
     (tmp_path / "a.png").write_bytes(b"nonsense")
-    with FolderSource().open(str(tmp_path), wait=1) as images:
+    with FolderSource().open(str(tmp_path), wait=0) as images:
         assert levels(images) == []
     assert "it is left out" in caplog.text
 
