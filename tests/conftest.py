@@ -12,9 +12,10 @@ from hypothesis import HealthCheck, settings
 if TYPE_CHECKING:
     from worlds import SmallWorld
 
-# on a busy machine, how long an example takes says nothing about it
-settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
-settings.load_profile("any machine")
+# the same examples for everybody, however long they take; `pytest --hypothesis-profile=explore` tries others
+settings.register_profile("alike", deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+settings.register_profile("explore", parent=settings.get_profile("alike"), derandomize=False)
+settings.load_profile("alike")
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +45,19 @@ def photographs(small_world: "SmallWorld", tmp_path_factory: pytest.TempPathFact
     folder = tmp_path_factory.mktemp("photographs")
     small_world.photograph(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def camera_file(photographs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The camera file that the command line makes of them."""
+    from worlds import SmallWorld
+
+    from opencsp_calib.cli import run
+
+    path = tmp_path_factory.mktemp("calibrated") / "camera.h5"
+    command = ["calibrate", str(photographs), "--board", SmallWorld.spec, "-o", str(path)]
+    assert run([*command, "--note", "aperture=f/8", "--pixel-pitch", "4.4"]) == 0
+    return path
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 from scipy.spatial.transform import Rotation
@@ -28,7 +28,7 @@ def record(**changes: Any) -> dict[str, Any]:
     return {**good, **changes}
 
 
-@settings(max_examples=30, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=30)
 @given(columns=st.integers(3, 12), rows=st.integers(3, 12), side=st.floats(1e-3, 2.0), seed=st.integers(0, 99))
 def test_a_shaped_board_comes_back_to_the_last_bit(
     columns: int, rows: int, side: float, seed: int, tmp_path: Path

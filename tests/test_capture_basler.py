@@ -36,7 +36,8 @@ def test_sandias_photographs_through_the_camera_to_a_camera_file(data_dir: Path,
     """Photographs come bit for bit through the camera, and the camera file is that of the files themselves."""
     scene = tmp_path / "scene"
     scene.mkdir()
-    for path in (data_dir / "sandia_checkerboard").glob("*.png"):
+    # a prime number: also where every second or third frame is missed, all come in time
+    for path in sorted((data_dir / "sandia_checkerboard").glob("*.png"))[:7]:
         (scene / path.name).write_bytes(path.read_bytes())
     settings = {"ImageFilename": scene, "ImageFileMode": "On", "TestImageSelector": "Off", "AcquisitionFrameRate": 2}
     asked = [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]

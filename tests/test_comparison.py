@@ -82,7 +82,7 @@ def test_hardly_matters_which_camera_comes_first(range_m: float | None) -> None:
     assert there.rotation @ back.rotation == pytest.approx(np.eye(3), abs=5e-4)
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(
     turn=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
     shift=st.tuples(*[st.floats(-0.05, 0.05)] * 3),

@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from board_photographs import SIZE, Photograph
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from opencsp_calib_opencv.board_kinds import CharucoKind
 
@@ -88,9 +88,6 @@ SPOT = st.builds(Spot, st.floats(0, SIZE[0]), st.floats(0, SIZE[1]), st.floats(2
 
 @settings(
     max_examples=20,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 @given(
     grid=st.tuples(SIDES, SIDES),

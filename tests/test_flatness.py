@@ -22,7 +22,7 @@ def test_the_nominal_board_is_flat_and_square() -> None:
     assert np.abs(found.in_plane_m).max() < 1e-15
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     turn=st.tuples(*[st.floats(-3, 3)] * 3),
     shift=st.tuples(*[st.floats(-5, 5)] * 3),

@@ -157,7 +157,7 @@ def test_fisheye_sees_beside_and_behind_but_not_where_it_folds() -> None:
     assert np.isnan(camera.project([[0.0, 0.0, -1.0]])).all()
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     k=st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3),
     p=st.lists(st.floats(-0.01, 0.01), min_size=2, max_size=2),

@@ -44,7 +44,7 @@ def test_seed_poses_follow_the_seeds_procedure() -> None:
     assert covered.all(), "the views together reach every part of the image"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     columns=st.integers(3, 30),
     rows=st.integers(3, 30),

@@ -93,7 +93,7 @@ def test_deep_formats_keep_every_bit_and_saturate_at_the_top(scene, pixel_format
     for name, value in (*settings.items(), ("PixelFormat", pixel_format)):
         features.write(camera.GetNodeMap(), name, value)
     camera.StartGrabbing(1)
-    frame = camera.RetrieveResult(3000)
+    frame = camera.RetrieveResult(60000)
     raw = frame.Array.copy()
     frame.Release()
     camera.Close()
@@ -220,13 +220,15 @@ def test_no_image_in_time_ends_in_a_sentence():
 
 
 def test_only_the_latest_image_is_given():
-    """After a pause of ten frames no more than one has waited: five more take four periods."""
+    """After a pause of ten frames no more than one waits."""
     with SOURCE.open(FIRST, AcquisitionFrameRate=20, **SMALL) as images:
         next(images)
-        time.sleep(0.5)
-        begin = time.monotonic()
-        list(islice(images, 5))
-        assert time.monotonic() - begin > 0.15
+        camera = images._camera
+        received = camera.GetStreamGrabberNodeMap().GetNode("Statistic_Total_Buffer_Count")
+        before = received.GetValue()
+        while received.GetValue() < before + 10:
+            time.sleep(0.01)
+        assert camera.NumReadyBuffers.Value <= 1
 
 
 def test_a_camera_that_was_gone_goes_on(caplog):

@@ -1,11 +1,11 @@
 """COLMAP: pycolmap's own projection of every camera model, and its own reading of what we write."""
 
 import struct
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
+from effort import at_most
 from format_truth import directions
 from opencsp_calib_formats.colmap import ColmapBinary, ColmapText
 from opencsp_calib_formats.reading import FileFormat
@@ -135,10 +135,8 @@ def test_what_cannot_be_carried_is_not_written(tmp_path: Path) -> None:
 def test_binary_files_that_lie(data: bytes, message: str, tmp_path: Path) -> None:
     path = tmp_path / "cameras.bin"
     path.write_bytes(data)
-    started = time.process_time()
-    with pytest.raises(FileFormatError, match=message):
+    with at_most(5), pytest.raises(FileFormatError, match=message):
         ColmapBinary().read(path)
-    assert time.process_time() - started < 5
 
 
 @pytest.mark.parametrize(

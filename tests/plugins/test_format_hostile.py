@@ -1,14 +1,14 @@
 """Files that are damaged, hostile or not what they seem: only our own errors come out, in bounded time."""
 
 import re
-import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
+from effort import at_most
 from format_files import FILES
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opencsp_calib.errors import CalibError
@@ -23,7 +23,7 @@ OPENINGS = [b"[", b'{"a":', b"<a>", b"- ", b"a:\n ", b"a = ", b"[[a.", b"&a [*a,
 RAYS = np.array(
     [[0.0, 0.0, 1.0], [0.1, -0.2, 1.0], [0.5, 0.4, 1.0], [1.0, 0.0, 0.0], [0.0, 0.1, -1.0], [0.0, 0.0, -1.0]]
 )
-FEW = settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FEW = settings(max_examples=30)
 
 
 def format_of(name: str) -> CameraFormat:
@@ -116,10 +116,9 @@ def test_random_bytes(name: str, tmp_path: Path, data: bytes) -> None:
 @pytest.mark.parametrize("name", sorted(installed().camera_formats))
 def test_deeply_nested(name: str, tmp_path: Path) -> None:
     for opening in OPENINGS:
-        started = time.process_time()
         if format_of(name).reads:
-            try_to_read(format_of(name), tmp_path / "file", opening * 50_000)
-        assert time.process_time() - started < 5
+            with at_most(5):
+                try_to_read(format_of(name), tmp_path / "file", opening * 50_000)
 
 
 @pytest.mark.parametrize("name", sorted(installed().camera_formats))
@@ -137,17 +136,15 @@ def test_no_file_no_text_and_a_folder(name: str, tmp_path: Path) -> None:
     ("name", "data"),
     [
         ("bundler", b"# Bundle file v0.3\n1152921504606846976 5\n9e2 0 0\n"),
-        ("bundler", b"# Bundle file v0.3\n300000 0\n" + b"9e2 0 0 1 0 0 0 1 0 0 0 1 0 0 0\n" * 100_000),
+        ("bundler", b"# Bundle file v0.3\n60000 0\n" + b"9e2 0 0 1 0 0 0 1 0 0 0 1 0 0 0\n" * 25_000),
         ("nvm", b"NVM_V3\n\n1152921504606846976\na 9e2 1 0 0 0 0 0 0 0 0\n"),
-        ("nvm", b"NVM_V3\n\n300000\n" + b"a 9e2 1 0 0 0 0 0 0 0 0\n" * 100_000),
-        ("opensfm", b"[" + b'{"cameras":{"a":{"projection_type":"dual","width":9,"height":9}}},' * 100_000 + b"{}]"),
-        ("transforms_json", b'{"frames": [' + b",".join(b'{"fl_x": %d}' % i for i in range(1, 100_000)) + b"]}"),
+        ("nvm", b"NVM_V3\n\n60000\n" + b"a 9e2 1 0 0 0 0 0 0 0 0\n" * 25_000),
+        ("opensfm", b"[" + b'{"cameras":{"a":{"projection_type":"dual","width":9,"height":9}}},' * 25_000 + b"{}]"),
+        ("transforms_json", b'{"frames": [' + b",".join(b'{"fl_x": %d}' % i for i in range(1, 25_000)) + b"]}"),
     ],
 )
 def test_claims_and_heaps_of_cameras_cost_little(name: str, data: bytes, tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_bytes(data)
-    started = time.process_time()
-    with pytest.raises(CalibError):
+    with at_most(10), pytest.raises(CalibError):
         format_of(name).read(path)
-    assert time.process_time() - started < 10

@@ -111,7 +111,7 @@ def test_brown_ends_where_it_folds() -> None:
     assert np.isnan(outside).all()
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.lists(st.floats(-0.05, 0.05), min_size=9, max_size=9), st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
 def test_jacobian_of_brown_is_its_derivative(c: list[float], x: float, y: float) -> None:
     terms = (tuple(c[:4]), (c[4] / 10, c[5] / 10, c[6], c[7]), (c[8] / 10, c[0] / 10, c[1] / 10, c[2] / 10))
@@ -122,7 +122,7 @@ def test_jacobian_of_brown_is_its_derivative(c: list[float], x: float, y: float)
     np.testing.assert_allclose(brown_with_jacobian(plane, *terms)[1][0], np.column_stack(numeric), atol=1e-8)
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(st.floats(-0.3, 0.3), st.floats(-0.1, 0.1), st.floats(-0.01, 0.01), st.floats(-0.01, 0.01))
 def test_inverse_brown_is_undone_by_brown(k1: float, k2: float, p1: float, p2: float) -> None:
     plane = on_plane(fan(35))

@@ -3,13 +3,13 @@
 import contextlib
 import json
 import struct
-import time
 from collections.abc import Mapping
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from effort import at_most
 from format_truth import agree, directions, perspective
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -202,11 +202,10 @@ def test_claims_are_not_believed(tmp_path: Path) -> None:
     for data in claims:
         path = tmp_path / "a.mat"
         path.write_bytes(data)
-        started = time.process_time()
-        assert not Matlab().recognises(path)
-        with pytest.raises(FileFormatError):
-            Matlab().read(path)
-        assert time.process_time() - started < 5
+        with at_most(5):
+            assert not Matlab().recognises(path)
+            with pytest.raises(FileFormatError):
+                Matlab().read(path)
 
 
 def test_nested_without_end(tmp_path: Path) -> None:
@@ -219,7 +218,7 @@ def test_nested_without_end(tmp_path: Path) -> None:
         Matlab().read(path)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(st.data())
 def test_damaged_objects(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     cells = [np.zeros((40, 1), np.uint8), changed(WorldUnits=1.0)]

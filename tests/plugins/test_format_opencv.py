@@ -92,7 +92,7 @@ def test_cv2_reads_what_we_write(suffix: str, model: str, tmp_path: Path) -> Non
     assert again.model == ("opencv4" if model == "pinhole" else model)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-1e40, 1e40), min_size=7, max_size=7), st.sampled_from(["yml", "xml", "json"]))
 def test_written_and_read_to_the_last_bit(
     tmp_path_factory: pytest.TempPathFactory, values: list[float], suffix

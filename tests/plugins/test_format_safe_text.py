@@ -3,13 +3,13 @@
 import ast
 import contextlib
 import math
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from effort import at_most
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from opencsp_calib_formats.fields import Fields, matrix, number, numbers, whole
@@ -71,7 +71,7 @@ plain_yaml = st.recursive(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(plain_yaml)
 def test_yaml_as_pyyaml_writes_it(value: Any) -> None:
     assert parse_yaml(yaml.safe_dump(value)) == [value]
@@ -90,10 +90,8 @@ def test_aliases_within_bounds() -> None:
 @pytest.mark.parametrize("parse", [parse_yaml, parse_json, parse_toml, parse_literal])
 @pytest.mark.parametrize("opening", OPENINGS)
 def test_nothing_takes_long(parse: Any, opening: str) -> None:
-    started = time.process_time()
-    with contextlib.suppress(FileFormatError):
+    with at_most(5), contextlib.suppress(FileFormatError):
         parse(("a = " if parse is parse_toml else "") + opening * 200_000)
-    assert time.process_time() - started < 5
 
 
 def test_a_key_that_is_there_twice_is_an_error_when_asked_for() -> None:
@@ -130,7 +128,7 @@ literals = st.recursive(
 )
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(literals)
 def test_literals_as_python_reads_them(value: Any) -> None:
     assert parse_literal(repr(value)) == ast.literal_eval(repr(value))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opencsp_calib import Camera
@@ -17,7 +17,7 @@ SIDES = st.integers(1, 10_000)
 
 
 @pytest.mark.parametrize(("name", "model"), WRITERS)
-@settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=8)
 @given(
     f=st.floats(100, 1e5),
     aspect=st.floats(0.9, 1.1),
