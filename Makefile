@@ -5,6 +5,9 @@ BIN := $(VENV)/bin
 # Python compiles what it imports when it does; compiling all that is installed takes most of the installation's time.
 INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 
+# Each process takes tests that stand together, which share what is made for them, and at the end some of the other's.
+PARALLEL := -n 2 --dist worksteal
+
 .PHONY: demo test pythons beside-opencsp lint docs bench pictures mutants coverage release clean help
 
 help:
@@ -22,7 +25,7 @@ demo: $(VENV)/.core
 	$(BIN)/opencsp-calib demo demo
 
 test: lint
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest $(PARALLEL)
 
 # The oldest dependencies that we support on the oldest Python, the newest on the newest that is here.
 pythons:
@@ -53,7 +56,7 @@ mutants: $(VENV)/.dev
 	$(BIN)/python validation/bench.py mutants
 
 coverage: $(VENV)/.dev
-	$(BIN)/python -m pytest -n 2 --cov=opencsp_calib --cov-report=term-missing:skip-covered --cov-fail-under=95
+	$(BIN)/python -m pytest $(PARALLEL) --cov=opencsp_calib --cov-report=term-missing:skip-covered --cov-fail-under=95
 
 # Wheel and sdist into dist/, and the wheel with all its extras at work in a clean environment.
 release: $(VENV)/.dev
