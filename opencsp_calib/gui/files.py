@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from opencsp_calib.errors import InputError
-from opencsp_calib.images import EXTENSIONS, ImageFile, find_images
+from opencsp_calib.images import ImageFile, find_images
 
 __all__ = ["file_name", "images_in", "shown", "within"]
 
@@ -52,8 +52,3 @@ def shown(folder: Path, path: Path) -> str:
     """A path as people read it: relative to the folder, where it is below."""
     root = folder.resolve()
     return path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)
-
-
-def is_image(name: str) -> bool:
-    """Whether a file's name is that of a photograph."""
-    return Path(name).suffix.lower() in EXTENSIONS
