@@ -3,16 +3,27 @@
 from dataclasses import dataclass
 
 import numpy as np
+from effort import at_most
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Board, Camera, Detection, Image, Pose
 from opencsp_calib.arrays import Floats
-from opencsp_calib.interfaces import Drawing
+from opencsp_calib.interfaces import Detector, Drawing
+from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.rendering import Exposure, Scene, render
 from opencsp_calib.synthetic import pose_in_view
 
 SIZE = (800, 600)
 NEAR_PX = 2.0  # what the fit of the corners starts from
+MOST_S = 1.0
+
+
+def detected(detector: Detector, image: Image, board: Board) -> Detection:
+    """What is found in the time that one image may take, on one core, whatever it shows; if not all, with a reason."""
+    with opencv_on_one_thread(), at_most(MOST_S):
+        detection = detector.detect(image, board)
+    assert len(detection) == len(board.points) or detection.reason
+    return detection
 
 
 def small_camera(focal_px: float = 1100.0, k1: float = -0.1, k2: float = 0.03, size: tuple[int, int] = SIZE) -> Camera:

@@ -16,6 +16,12 @@ __all__ = ["FILES", "HDF5_FILES"]
 K = [[900.5, 0.0, 502.0], [0.0, 901.5, 398.5], [0.0, 0.0, 1.0]]
 D = [-0.1, 0.02, 0.001, -0.002, -0.003]
 
+
+def in_json(content: object) -> bytes:
+    """As a file has it."""
+    return json.dumps(content).encode()
+
+
 OPENCV_YAML = b"""%YAML:1.0
 ---
 calibration_time: "Sun 01 Nov 2026"
@@ -145,7 +151,7 @@ MATLAB = {
     "IntrinsicMatrix": np.transpose(K),
 }
 OBJECT = object_file([np.zeros((8, 1), np.uint8), MATLAB], {"params": "cameraParameters"}, compress=False)
-MATLAB_JSON = json.dumps({key: value.tolist() for key, value in MATLAB.items()}).encode()
+MATLAB_JSON = in_json({key: value.tolist() for key, value in MATLAB.items()})
 FISHEYE = {
     "MappingCoefficients": [[350.0, -1.1e-3, 4e-7, -6e-10]],
     "DistortionCenter": [[512.0, 398.0]],
@@ -177,7 +183,7 @@ FILES: Mapping[str, Mapping[str, bytes]] = {
     "opencv": {
         "camera.yml": OPENCV_YAML,
         "stereo.xml": OPENCV_XML,
-        "plain.json": json.dumps({"K": K, "D": D}).encode(),
+        "plain.json": in_json({"K": K, "D": D}),
     },
     "ros": {"ost.yaml": ROS},
     "ros-ini": {"ost.ini": ROS_INI},

@@ -42,8 +42,12 @@ class Part:
 
 PARTS = (
     Part("models", ("models/*.py",), ("test_models", "test_camera")),
-    Part("corners", ("corner*.py", "corner_kernel/*.py"), ("test_corners",)),
-    Part("hdf5", ("hdf5*.py",), ("test_hdf5",)),
+    Part(
+        "corners",
+        ("corner*.py", "corner_kernel/*.py"),
+        ("test_corner_grid", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
+    ),
+    Part("hdf5", ("hdf5*.py",), ("test_hdf5", "test_hdf5_damage")),
     Part("comparison", ("comparison.py",), ("test_comparison",)),
 )
 

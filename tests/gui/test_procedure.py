@@ -4,9 +4,8 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
+from camera_files import assert_same_files
 from gui_window import Server, Window, run_cli
 
 pytestmark = pytest.mark.timeout(600)
@@ -23,23 +22,6 @@ def window(chromium: object, tmp_path: Path) -> Iterator[Window]:
         opened.open()
         yield opened
         opened.leave()
-
-
-def content(path: Path) -> dict[str, object]:
-    """Everything in a camera file but its provenance."""
-    values: dict[str, object] = {}
-    with h5py.File(path) as file:
-        file.visititems(lambda name, item: values.update({name: item[()]}) if isinstance(item, h5py.Dataset) else None)
-        values |= {f"Camera@{name}": value for name, value in file["Camera"].attrs.items()}
-    values.pop("Calibration/provenance")
-    return values
-
-
-def assert_equal_files(one: Path, other: Path) -> None:
-    first, second = content(one), content(other)
-    assert first.keys() == second.keys()
-    for name in first:
-        np.testing.assert_array_equal(first[name], second[name], err_msg=name)
 
 
 def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> None:
@@ -85,7 +67,7 @@ def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> 
     window.until(lambda: window.status == "Camera saved: sandia.h5")
     by_cli = tmp_path / "cli.h5"
     run_cli("calibrate", *photographs, "--board", BOARD, "--name", "sandia", "--exclude", worst, "-o", by_cli)
-    assert_equal_files(window.server.folder / "sandia.h5", by_cli)
+    assert_same_files(window.server.folder / "sandia.h5", by_cli)
     downloaded = window.browser.downloads / "sandia.h5"
     window.until(downloaded.exists)
     window.until(lambda: downloaded.read_bytes() == (window.server.folder / "sandia.h5").read_bytes())

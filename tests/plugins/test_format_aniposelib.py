@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import ANIPOSELIB, CALISCOPE
+from format_files_robotics import ANIPOSELIB, CALISCOPE
 from format_truth import agree, directions, opencv, opencv_fisheye
 from opencsp_calib_formats.aniposelib import Aniposelib
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import CALIBIO
+from format_files_robotics import CALIBIO
 from format_truth import agree, directions, opencv
 from opencsp_calib_formats.calibio import CalibIo
 

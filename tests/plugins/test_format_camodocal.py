@@ -5,7 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from format_files import CAMODOCAL
+from format_files_robotics import CAMODOCAL
 from format_truth import agree, directions, opencv, opencv_fisheye
 from opencsp_calib_formats.camodocal import Camodocal
 

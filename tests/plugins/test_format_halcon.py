@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import HALCON
+from format_files_robotics import HALCON
 from format_truth import agree, directions, opencv
 from opencsp_calib_formats.halcon import Halcon
 

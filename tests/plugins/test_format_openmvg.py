@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import OPENMVG
+from format_files_photogrammetry import OPENMVG
 from format_truth import agree, directions, opencv, opencv_fisheye
 from opencsp_calib_formats.openmvg import OpenMvg
 

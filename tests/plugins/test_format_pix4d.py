@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import PIX4D_CAM, PIX4D_TXT
+from format_files_photogrammetry import PIX4D_CAM, PIX4D_TXT
 from format_truth import agree, directions, opencv
 from opencsp_calib_formats.pix4d import Pix4D
 

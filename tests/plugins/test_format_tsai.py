@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from format_files import TSAI
+from format_files_robotics import TSAI
 from format_truth import agree, directions, opencv, opencv_fisheye, perspective
 from opencsp_calib_formats.tsai import Tsai
 

@@ -1,14 +1,13 @@
 """ChArUco boards are found whole or in part; a board that is another one is named, with how to write it."""
 
-import time
 from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from board_photographs import NEAR_PX, SIZE, Photograph
-from hypothesis import HealthCheck, assume, given, settings
+from board_photographs import NEAR_PX, SIZE, Photograph, detected
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from opencsp_calib_opencv.board_kinds import CharucoKind
 from opencsp_calib_opencv.charuco import CharucoDetector
@@ -17,22 +16,14 @@ from opencsp_calib import CharucoBoard, Detection, Image
 from opencsp_calib.corners import refine
 from opencsp_calib.errors import InputError
 from opencsp_calib.images import find_images, read_image
-from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.rendering import Exposure, Scene, Spot
 
 CALISCOPE = CharucoKind().parse("charuco:4x5:54mm:40.5mm:DICT_4X4_50:inverted")
 BOARD = CharucoBoard(8, 6, 0.04, marker_m=0.03, dictionary="DICT_5X5_100")
-MOST_SECONDS = 1.0
 
 
 def find(image: Image, board: CharucoBoard = BOARD) -> Detection:
-    """Within the time that one image may take, on one core, whatever it shows."""
-    with opencv_on_one_thread():
-        begin = time.thread_time()
-        detection = CharucoDetector().detect(image, board)
-        assert time.thread_time() - begin < MOST_SECONDS
-    assert len(detection) == len(board.points) or detection.reason
-    return detection
+    return detected(CharucoDetector(), image, board)
 
 
 def photograph_of(board: CharucoBoard, **how: object) -> Photograph:
@@ -229,9 +220,6 @@ def test_a_hundred_megapixels() -> None:
 
 SEARCH = settings(
     max_examples=25,
-    deadline=None,
-    derandomize=True,
-    suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much],
 )
 UNIT = st.floats(0, 1)
 

@@ -1,0 +1,28 @@
+"""Commands run in this process: what they answer, and how they complain."""
+
+import json
+
+import pytest
+
+from opencsp_calib.cli import run
+
+QUICK = ("--solver", "opencv")
+
+
+def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
+    """The JSON that a command prints; standard output must hold nothing else."""
+    code = run([*map(str, arguments), "--json"])
+    output = capsys.readouterr()
+    assert code == 0, output.err
+    return json.loads(output.out)
+
+
+def complaint(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 2) -> str:
+    """What a command that fails says: one line at the end, no traceback, nothing on standard output."""
+    assert run([*map(str, arguments)]) == code
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert "Traceback" not in output.err
+    last = output.err.strip().splitlines()[-1]
+    assert last.startswith("error: ")
+    return last

@@ -1,0 +1,167 @@
+"""Every way to get the command line wrong: one line says what, where, and what to do."""
+
+import json
+import os
+import shutil
+import stat
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from command_line import QUICK, answer, complaint
+from worlds import SmallWorld
+
+from opencsp_calib.cli import run
+from opencsp_calib.images import write_image
+
+
+def garbage(folder: Path, photographs: Path, how: str) -> None:
+    shutil.copytree(photographs, folder, dirs_exist_ok=True)
+    if how == "empty":
+        (folder / "05.png").write_bytes(b"")
+    elif how == "cut":
+        (folder / "05.png").write_bytes((folder / "05.png").read_bytes()[:3000])
+    elif how == "text":
+        (folder / "05.png").write_text("not an image")
+    elif how == "size":
+        write_image(np.full((300, 400), 90, np.uint8), folder / "05.png")
+    elif how == "twice":
+        shutil.copy(folder / "01.png", folder / "05.png")
+    elif how == "no board":
+        write_image(np.full((480, 640), 90, np.uint8), folder / "05.png")
+
+
+@pytest.mark.parametrize(
+    ("how", "status"),
+    [
+        ("empty", "unreadable"),
+        ("cut", "unreadable"),
+        ("text", "unreadable"),
+        ("size", "wrong size"),
+        ("twice", "duplicate"),
+        ("no board", "no board"),
+    ],
+)
+def test_one_bad_image_is_listed_and_does_not_stop_the_run(
+    how: str, status: str, photographs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    garbage(tmp_path, photographs, how)
+    assert run(["calibrate", str(tmp_path), "--board", SmallWorld.spec, "--json", *QUICK]) == 0
+    output = capsys.readouterr()
+    view = json.loads(output.out)["views"][4]
+    assert view["image"] == "05.png"
+    assert view["status"] == status
+    assert view["problems"]
+    assert f"05.png: {status}: " in output.err
+
+
+@pytest.mark.parametrize(
+    ("spec", "words"),
+    [
+        ("18x23", "checkerboard:"),
+        ("checkerboard:9x6", "size of a square"),
+        ("checkerboard:9x6:30", "unit"),
+        ("checkerboard:9:30mm", "9x6|COLUMNSxROWS|columns"),
+        ("checkerboard:9x6:30mm:extra", "checkerboard:COLUMNSxROWS:SIZE"),
+        ("charuco:4x5:54mm:40mm:DICT_NONE", "DICT_4X4_50"),
+        ("dots:4x5:3mm", "dots"),
+        ("missing.json", "missing.json"),
+    ],
+)
+def test_a_wrong_board_says_how_it_is_written(spec: str, words: str, photographs: Path, capsys) -> None:
+    line = complaint(capsys, "calibrate", photographs, "--board", spec)
+    assert any(word in line for word in words.split("|")), line
+
+
+def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, capsys) -> None:
+    """A plain checkerboard of 6x9 is one of 9x6 seen from the side: nothing tells them apart, and nothing needs to."""
+    named = [
+        answer(capsys, "calibrate", photographs, "--board", f"checkerboard:{size}:30mm") for size in ("9x6", "6x9")
+    ]
+    values = [np.array(list(printed["camera"]["params"].values())) for printed in named]
+    np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt"])
+def test_a_camera_file_is_not_named_like_another_format(name, tmp_path: Path, capsys) -> None:
+    said = complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / name)
+    assert "let its name end in .h5" in said
+    assert "convert" in said
+
+
+def test_no_board_anywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for index in range(3):
+        write_image(np.full((480, 640), 60 + index, np.uint8), tmp_path / f"{index}.png")
+    assert "in any of the 3 images" in complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec)
+    seen = tmp_path / "seen.h5"
+    assert "in any of the 3 images" in complaint(capsys, "detect", tmp_path, "--board", SmallWorld.spec, "-o", seen)
+    assert not seen.exists()
+
+
+def test_too_few_views(photographs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    two = sorted(photographs.iterdir())[:2]
+    assert "at least 3 views" in complaint(capsys, "calibrate", *two, "--board", SmallWorld.spec)
+
+
+def test_files_that_are_not_there(photographs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    board = ("--board", SmallWorld.spec)
+    assert "no such file" in complaint(capsys, "calibrate", tmp_path / "none", *board)
+    assert "has no image files" in complaint(capsys, "calibrate", tmp_path, *board)
+    assert "does not exist" in complaint(capsys, "calibrate", photographs, *board, "-o", tmp_path / "no" / "c.h5")
+    assert "does not exist" in complaint(
+        capsys, "calibrate", photographs, *board, "--report", tmp_path / "no" / "r.html"
+    )
+    assert "does not exist" in complaint(capsys, "show", tmp_path / "none.h5")
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_may_not_be_written(photographs: Path, tmp_path: Path, capsys) -> None:
+    tmp_path.chmod(stat.S_IRUSR | stat.S_IXUSR)
+    line = complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, "-o", tmp_path / "c.h5")
+    assert "no permission" in line
+
+
+def test_foreign_and_damaged_files(camera_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with h5py.File(tmp_path / "foreign.h5", "w") as file:
+        file["Data/x"] = 3
+    damaged = bytearray(camera_file.read_bytes())
+    damaged[len(damaged) // 2 :] = b""
+    (tmp_path / "damaged.h5").write_bytes(damaged)
+    for name in ("foreign.h5", "damaged.h5"):
+        assert name in complaint(capsys, "show", tmp_path / name)
+        assert name in complaint(capsys, "solve", tmp_path / name)
+
+
+def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    base = ("calibrate", photographs, "--board", SmallWorld.spec)
+    assert "--board" in complaint(capsys, "calibrate", photographs)
+    assert "opencv6" in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, "--model", "opencv6")
+    assert "'magic'" in complaint(capsys, *base, "--solver", "magic")
+    assert "bundle" in complaint(capsys, *base, "--solver", "opencv", "--board-shape", "free")
+    assert "--solver" in complaint(capsys, *base, "--preset", "opencsp", "--solver", "mrcal")
+    assert "KEY=VALUE" in complaint(capsys, *base, "--note", "f8")
+    assert "free, square or a number" in complaint(capsys, *base, "--pixel-aspect", "round")
+    assert "WIDTHxHEIGHT" in complaint(capsys, "show", camera_file, "--image-size", "big")
+    assert complaint(capsys, "nonsense")
+    assert ".png, .svg or .pdf" in complaint(capsys, "compare", camera_file, camera_file, "--plot", "x.gif")
+
+
+def test_nothing_is_written_when_it_fails(photographs: Path, tmp_path: Path, capsys) -> None:
+    out = tmp_path / "c.h5"
+    out.write_text("precious")
+    complaint(capsys, "calibrate", photographs, "--board", "checkerboard:5x4:30mm", "-o", out)
+    assert out.read_text() == "precious"
+    assert [path.name for path in tmp_path.iterdir()] == ["c.h5"]
+
+
+def test_an_interruption_that_a_library_turned_into_an_error_is_one_line(monkeypatch, capsys) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise TypeError("Cannot compare structured arrays")
+
+    monkeypatch.setattr("opencsp_calib.cli.app", interrupted)
+    with pytest.raises(TypeError):
+        run(["formats"])
+    monkeypatch.setattr("opencsp_calib.cli.stopping._told", [15])
+    assert run(["formats"]) == 1
+    assert capsys.readouterr().err.startswith("error: stopped")
