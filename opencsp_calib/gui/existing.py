@@ -13,6 +13,7 @@ from opencsp_calib.errors import CalibError
 from opencsp_calib.gui import existing_actions as actions
 from opencsp_calib.gui.controls import field
 from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.wording import worded
 from opencsp_calib.judgement import judge
 from opencsp_calib.summary import parameter_lines
 
@@ -85,7 +86,7 @@ def _told(file: CameraFile) -> str:
     try:
         camera = file.camera
     except CalibError as error:
-        return f'<h1>{escape(file.name)}</h1><div class="verdict doubt">{escape(str(error))}</div>'
+        return f'<h1>{escape(file.name)}</h1><div class="verdict doubt">{escape(worded(str(error)))}</div>'
     solved = file.calibration
     lines = parameter_lines(camera, solved.sigma if solved else None, file.record)
     size = " × ".join(map(str, camera.image_size))

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from opencsp_calib.gui.news import Progress
+from opencsp_calib.gui.wording import worded
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -18,12 +19,12 @@ def build(page: "Page") -> Callable[[], None]:
     session = page.session
     line = ui.label().props("data-testid=status role=status aria-live=polite").classes("status")
     with ui.element("div").classes("work") as work:
-        bar = ui.linear_progress(show_value=False, size="6px").props("rounded aria-label=Progress")
+        bar = ui.linear_progress(show_value=False, size="6px").props("rounded instant-feedback aria-label=Progress")
         ui.button("Cancel", on_click=session.cancel).props("no-caps outline dense data-testid=cancel")
 
     def refresh() -> None:
         progress = session.progress
-        line.set_text(_said(progress) if progress else session.message.text)
+        line.set_text(_said(progress) if progress else worded(session.message.text))
         line.classes(replace=f"status {session.message.level if not progress else 'info'}")
         work.set_visibility(progress is not None)
         if progress:
