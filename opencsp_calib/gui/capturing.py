@@ -11,6 +11,7 @@ from opencsp_calib.gui.camera import SHOWN_PX, LiveCamera
 from opencsp_calib.gui.controls import action, choice, field, quiet_action
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.procedure import find_and_calibrate
+from opencsp_calib.gui.wording import worded
 from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
@@ -89,8 +90,8 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         field("Photographs go to the folder", asked["folder"], take("folder"), "capture-folder")
         choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
         field("Photographs in all", asked["count"], take("count"), "capture-count")
-        settings = ui.textarea("Settings, one FEATURE=VALUE a line", on_change=lambda e: asked.update(set=e.value))
-        settings.props("outlined dense autogrow data-testid=capture-settings").classes("field")
+        settings = ui.textarea("Camera settings", on_change=lambda e: asked.update(set=e.value)).classes("field")
+        settings.props('outlined dense autogrow data-testid=capture-settings placeholder="FEATURE=VALUE, one a line"')
         begin = action("Start", start, "capture-start")
         end = quiet_action("Stop", lambda: camera.order("stop"), "capture-stop")
         with ui.element("div").classes("side-by-side"):
@@ -120,16 +121,18 @@ def _number(text: str) -> int:
 
 
 def _gauges(camera: LiveCamera) -> Callable[[], None]:
-    with ui.element("section").classes("step"):
-        table = ui.html(sanitize=True).classes("gauges").props("data-testid=capture-gauges")
-    with ui.element("section").classes("step"):
-        known = ui.label().classes("value").props("data-testid=capture-known")
-        bar = ui.linear_progress(value=0.0, show_value=False, size="6px").props("rounded aria-label=Progress")
-        following = ui.label().classes("hint").props("data-testid=capture-next")
-        missing = ui.label().classes("hint missing").props("data-testid=capture-missing")
+    with ui.element("div") as told:
+        with ui.element("section").classes("step"):
+            table = ui.html(sanitize=True).classes("gauges").props("data-testid=capture-gauges")
+        with ui.element("section").classes("step"):
+            known = ui.label().classes("value").props("data-testid=capture-known")
+            bar = ui.linear_progress(value=0.0, show_value=False, size="6px").props("rounded aria-label=Progress")
+            following = ui.label().classes("hint").props("data-testid=capture-next")
+            missing = ui.label().classes("hint missing").props("data-testid=capture-missing")
 
     def refresh() -> None:
         frame = camera.frame
+        told.set_visibility(frame is not None)
         if frame is None:
             return
         table.set_content("".join(_row(*gauge) for gauge in frame["gauges"]))
@@ -153,7 +156,7 @@ def _picture(camera: LiveCamera) -> Callable[[], None]:
     said = ui.label().props("data-testid=capture-message")
 
     def refresh() -> None:
-        said.set_text(camera.message.text)
+        said.set_text(worded(camera.message.text))
         said.classes(replace=f"status {camera.message.level}")
         frame = camera.frame
         if frame is None:

@@ -48,9 +48,25 @@ export default {
     window.removeEventListener("keydown", this.step);
   },
   computed: {
+    gaps() {
+      // between neighbours, in pixels of the photograph: the narrowest along a row, and from row to row
+      const at = new Map(this.corners.map(([id, x, y]) => [id, [x, y]]));
+      const narrowest = (step) => {
+        const far = [...at].map(([id, [x, y]]) => {
+          const next = at.get(id + step);
+          return next && (step > 1 || (id + 1) % this.columns) ? Math.hypot(next[0] - x, next[1] - y) : Infinity;
+        });
+        return Math.min(Infinity, ...far);
+      };
+      return { across: narrowest(1), down: narrowest(this.columns) };
+    },
     numbered() {
-      const near = this.unit < 0.35;
-      return this.corners.filter((c) => near || c[0] % this.columns === 0 || c[0] % this.columns === this.columns - 1);
+      // as many as do not lie over each other; at least those at both ends of each n-th row
+      const { across, down } = this.gaps;
+      const all = across > 30 * this.unit && down > 13 * this.unit;
+      const rows = Math.max(1, Math.ceil((13 * this.unit) / down));
+      const ends = ([id]) => id % this.columns === 0 || id % this.columns === this.columns - 1;
+      return this.corners.filter((c) => all || (ends(c) && Math.floor(c[0] / this.columns) % rows === 0));
     },
     arrowPath() {
       return this.corners
@@ -75,8 +91,11 @@ export default {
       this.measure();
     },
     measure() {
-      const box = this.$refs.svg?.getBoundingClientRect(); // pixels of the photograph for one of the screen
-      if (box?.width) this.unit = Math.max(this.w / box.width, this.h / box.height);
+      const svg = this.$refs.svg;
+      const box = svg?.getBoundingClientRect();
+      if (!box?.width) return;
+      const zoom = svg.currentCSSZoom ?? 1; // large screens show the whole page larger
+      this.unit = zoom * Math.max(this.w / box.width, this.h / box.height); // pixels of the photograph for one of the page
     },
     at(event) {
       const matrix = this.$refs.svg.getScreenCTM().inverse();

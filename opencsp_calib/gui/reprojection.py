@@ -26,7 +26,11 @@ def build(page: "Page") -> Callable[[], None]:
         page.look_at(event.name)
 
     title = ui.html("<h2>Each view, in order of capture</h2>", sanitize=False).classes("report")
-    chart = ui.echart({}, on_point_click=clicked).classes("bars").props('role=img aria-label="rms of each view"')
+    chart = (
+        ui.echart({}, on_point_click=clicked, renderer="svg")
+        .classes("bars")
+        .props('role=img aria-label="rms of each view"')
+    )
     hint = ui.label("A click on a bar opens its photograph. The dashed line is the rms of all views.").classes("hint")
     rest = of_calibration(page, _residuals)
     shown: list[Any] = [None]
@@ -71,6 +75,7 @@ def _bars(calibration: Calibration) -> dict[str, Any]:
             "name": "rms (px)",
             "axisLabel": {"color": QUIET},
             "nameTextStyle": {"color": QUIET},
+            "splitLine": {"lineStyle": {"color": QUIET, "opacity": 0.35}},
         },
         "series": [
             {
