@@ -22,19 +22,19 @@ def run_cli(*arguments: object) -> None:
 class Server:
     """``opencsp-calib gui`` in a process of its own."""
 
-    def __init__(self, folder: Path, **environment: str) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *options: str, **environment: str) -> None:
+        self.folder, self._options = folder, options
         self._environment = os.environ | {"PYLON_CAMEMU": "1"} | environment  # with Basler's emulated cameras
 
     def __enter__(self) -> "Server":
-        command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser"]
+        command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser", *self._options]
         self.process = subprocess.Popen(
             command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self._environment
         )
         self.address = self.process.stdout.readline().strip()
-        match = re.fullmatch(r"http://127\.0\.0\.1:([0-9]+)/\?token=([\w-]{20,})", self.address)
+        match = re.fullmatch(r"(http://[\w.-]+:[0-9]+/)\?token=([\w-]{20,})", self.address)
         assert match, self.process.communicate()
-        self.root = f"http://127.0.0.1:{match[1]}/"
+        self.root = match[1]
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -74,15 +74,20 @@ class Window:
         return self.browser.find_element("css selector", f"[data-testid={testid}]")
 
     def until(self, true: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-        """Wait until it is true; elements that are made anew meanwhile do not matter."""
-        from selenium.common.exceptions import NoSuchElementException, StaleElementReferenceException
+        """Wait until it is true; elements that are made anew, or just going, do not matter."""
+        from selenium.common import exceptions
 
+        passing = (
+            exceptions.NoSuchElementException,
+            exceptions.StaleElementReferenceException,
+            exceptions.ElementNotInteractableException,
+        )
         end = time.monotonic() + patience_s
         while True:
             try:
                 if found := true():
                     return found
-            except (StaleElementReferenceException, NoSuchElementException):
+            except passing:
                 found = None
             if time.monotonic() > end:
                 self.picture("gave-up")

@@ -2,6 +2,7 @@
 
 import shutil
 import time
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -86,3 +87,18 @@ def test_a_camera_that_is_not_there_is_one_sentence(window: Window) -> None:
     window.click("capture-start")
     window.until(lambda: "no Basler camera '4711'" in window.element("capture-message").text)
     window.until(lambda: window.element("capture-start").is_displayed())
+
+
+def test_a_photograph_every_two_seconds(window: Window) -> None:
+    """The camera's own test picture will do: nobody asks for a board in it."""
+    window.describe("captured", 9, 6, 30)
+    open_tab(window)
+    window.type("capture-folder", "every-two-seconds")
+    window.choose("Release", "every two seconds")
+    window.type("capture-count", "3")
+    window.until(lambda: window.enabled("capture-start"))
+    start(window)
+    window.until(lambda: "photographs are taken" in window.element("capture-message").text)
+    taken_at = sorted(path.stat().st_mtime for path in (window.server.folder / "every-two-seconds").glob("*.png"))
+    assert len(taken_at) == 3
+    assert all(later - earlier > 1.5 for earlier, later in pairwise(taken_at))

@@ -1,0 +1,91 @@
+"""Who is let into the window, and what it asks of others."""
+
+import http.client
+import socket
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+from gui_window import Server, Window
+
+pytestmark = pytest.mark.timeout(300)
+
+
+def answer(server: Server, path: str, method: str = "GET", address: str = "127.0.0.1", **headers: str) -> int:
+    """The status of a request without the browser's cookie."""
+    connection = http.client.HTTPConnection(address, urlsplit(server.address).port or 0, timeout=30)
+    connection.request(method, path, headers=headers)
+    status = connection.getresponse().status
+    connection.close()
+    return status
+
+
+def test_only_who_has_the_token_is_let_in(server: Server) -> None:
+    token = urlsplit(server.address).query
+    home, own = f"/?{token}", urlsplit(server.address).netloc
+    socket_path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
+    upgrade |= {"Sec-WebSocket-Key": "x3JJHMbDL1EzLkh9GBhXDw=="}
+    assert answer(server, home) == 200
+    assert urlsplit(server.address).hostname == "127.0.0.1"
+    assert answer(server, home, Origin=f"http://{own}") == 200
+    for path in ("/", "/?token=wrong", "/?token=", "/photographs?image=x", "/files?path=x", "/nothing", socket_path):
+        assert answer(server, path) == 403, path
+    assert answer(server, socket_path, **upgrade) == 403
+    for host in ("evil.example", f"evil.example:{urlsplit(own).port}", "127.0.0.1.evil.example", "", "[", "10.0.0.1"):
+        assert answer(server, home, Host=host) == 403, host
+    for origin in ("http://evil.example", "null", f"https://evil.example/{own}", "http://127.0.0.1:1"):
+        assert answer(server, home, Origin=origin) == 403, origin
+    where = urlsplit(server.address)
+    before = list(server.folder.rglob("*"))
+    assert answer(server, "/photographs?name=a&batch=b&count=1", method="PUT") == 403
+    assert list(server.folder.rglob("*")) == before
+    with socket.socket() as elsewhere:  # another address of this machine: nobody listens there
+        elsewhere.settimeout(5)
+        assert elsewhere.connect_ex(("127.0.0.2", where.port or 0)) != 0
+
+
+def test_files_outside_of_the_folder_are_out_of_reach(server: Server) -> None:
+    token, secret = urlsplit(server.address).query, server.folder.parent / "secret.h5"
+    secret.write_text("secret")
+    (server.folder / "link.h5").symlink_to(secret)
+    (server.folder / "inside.txt").write_text("inside")
+    assert answer(server, f"/files?path=inside.txt&{token}") == 200
+    outside = (
+        "../secret.h5",
+        str(secret),
+        "link.h5",
+        "/etc/passwd",
+        "..%2Fsecret.h5",
+        "a/../../secret.h5",
+    )
+    for path in outside:
+        assert answer(server, f"/files?path={path}&{token}") == 403, path
+    assert answer(server, f"/photographs?image=..%2Fsecret.h5&{token}") == 404
+    assert answer(server, f"/..%2F..%2Fetc%2Fpasswd?{token}") == 404
+
+
+def test_nothing_is_asked_of_another_machine(small: Window) -> None:
+    """What our own policy for the page would keep it from asking is an error in the browser's log."""
+    small.find_corners()
+    small.tab("Print a board")
+    small.until(lambda: small.find_all(".board-picture[src^=data]"))
+    asked = set(small.browser.execute_script("return performance.getEntriesByType('resource').map((one) => one.name)"))
+    assert {urlsplit(url).scheme for url in asked} <= {"http", "data", "blob"}
+    assert {urlsplit(url).hostname for url in asked if urlsplit(url).scheme == "http"} == {"127.0.0.1"}
+    assert not [entry for entry in small.browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+def test_wider_open_it_says_what_that_means(tmp_path: Path) -> None:
+    """Other machines need the token as well, and a page of another name is refused as ever."""
+    everywhere = "0.0.0.0"  # noqa: S104
+    with Server(tmp_path, "--host", everywhere) as server:
+        token, port = urlsplit(server.address).query, urlsplit(server.address).port
+        assert urlsplit(server.address).hostname == socket.gethostname().lower()
+        assert answer(server, f"/?{token}", address="127.0.0.2") == 200
+        assert answer(server, "/", address="127.0.0.2") == 403
+        assert answer(server, f"/?{token}", address="127.0.0.2", Host=f"evil.example:{port}") == 403
+        assert answer(server, f"/?{token}", address="127.0.0.2", Origin="http://evil.example") == 403
+    assert server.more_output == ""
+    for words in ("listening on 0.0.0.0", str(tmp_path.resolve()), "nothing on the way is encrypted", "ssh -L"):
+        assert words in " ".join(server.errors.split())
