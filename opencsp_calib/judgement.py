@@ -4,6 +4,7 @@ The seed's procedure asks for about 50 views, the board tilted by 30 to 45 degre
 with the board horizontal and half vertical, filling the image, and an rms below 1 px.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -14,7 +15,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.quality import SetQuality, ViewQuality, set_quality, view_qualities
 
-__all__ = ["REMARKS", "Verdict", "fold_inside", "judge", "verdict"]
+__all__ = ["REMARKS", "Verdict", "conclusion", "fold_inside", "judge", "verdict"]
 
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
@@ -46,7 +47,8 @@ class Verdict:
 
 def judge(calibration: Calibration) -> tuple[Problem, ...]:
     """What a person should know about the result: what was noted on the way, then what the views and numbers say."""
-    views, whole = view_qualities(calibration), set_quality(calibration)
+    views = view_qualities(calibration)
+    whole = set_quality(calibration, views)
     found = [
         _poor_rms(calibration),
         *(_poor_view(view) for view in views),
@@ -64,8 +66,12 @@ def judge(calibration: Calibration) -> tuple[Problem, ...]:
 
 
 def verdict(calibration: Calibration) -> Verdict:
+    """What `judge` finds, in one sentence."""
+    return conclusion(judge(calibration))
+
+
+def conclusion(problems: Sequence[Problem]) -> Verdict:
     """What `judge` found, in one sentence."""
-    problems = judge(calibration)
     bad = [problem for problem in problems if problem.code in DISQUALIFYING]
     doubts = [problem for problem in problems if problem.code not in (*DISQUALIFYING, *REMARKS)]
     if bad:

@@ -1,5 +1,6 @@
 """What a calibration's views are like, one by one and together: tilt, range, coverage."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -105,9 +106,9 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
     return tuple(results)
 
 
-def set_quality(calibration: Calibration) -> SetQuality:
-    """What the used views are like together."""
-    views = view_qualities(calibration)
+def set_quality(calibration: Calibration, views: Sequence[ViewQuality] = ()) -> SetQuality:
+    """What the used views are like together; `view_qualities` of them can be given, where they are known."""
+    views = views or view_qualities(calibration)
     horizontal = sum(view.orientation == "horizontal" for view in views)
     return SetQuality(
         views=len(views),

@@ -1,6 +1,5 @@
 """The command that opens the window: gui."""
 
-import gc
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -36,10 +35,8 @@ def gui(
             f"and change the files in {folder.resolve()}, and nothing on the way is encrypted. Safer: leave --host "
             "away and forward the port: ssh -L 8080:127.0.0.1:PORT THIS-MACHINE"
         )
-    gc.disable()  # loading makes very many objects and no garbage, and looking for some takes a tenth of its time
-    from opencsp_calib.gui.server import serve
+    from opencsp_calib.gui.loading import serve
 
-    gc.enable()
     serve(folder, host, port, open_browser=browser)
 
 

@@ -2,7 +2,8 @@
 
 ::
 
-    server.py    starts: socket, token, address          guard.py   who may ask at all
+    loading.py   loads all this quickly                  server.py  starts: socket, token, address
+    guard.py     who may ask at all
     session.py   what has been chosen and found so far, kept in a folder in DIR
     offered.py   what plugins offer here
     work.py      hands long work to jobs.py, which runs in a process of its own

@@ -11,6 +11,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any, TextIO, TypeAlias
 
 from opencsp_calib.errors import CalibError
@@ -46,7 +47,7 @@ def _listen(asked: "queue.Queue[dict[str, Any]]") -> None:
 def _load() -> None:
     """Load beforehand what a job will need; and leave the page what it needs of the processor."""
     if hasattr(os, "nice"):
-        os.nice(5)
+        os.nice(10)
     from opencsp_calib import pipeline  # noqa: F401
     from opencsp_calib.corners import prepare
     from opencsp_calib.registry import installed
@@ -92,11 +93,12 @@ def solve(
     select: int = 0,
     drop_worst: int = 0,
     max_rms: float | None = None,
-) -> None:
-    """Solve for the camera, without the images to be excluded or left out; writes a camera file."""
+) -> dict[str, str]:
+    """Solve for the camera, without the images to be excluded or left out; writes a camera file, gives the verdict."""
     from opencsp_calib import dropping, pipeline
     from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.hdf5_calibration import load_observations, save_calibration
+    from opencsp_calib.judgement import verdict
 
     if guess:
         options["guess"] = read_camera_file(guess).camera
@@ -109,6 +111,7 @@ def solve(
     if max_rms is not None:
         result = dropping.drop_above(result, max_rms, lambda views: pipeline.solve(views, **options))
     save_calibration(result, calibration)
+    return asdict(verdict(result))
 
 
 def validate(tell: Tell, calibration: str, sections: str) -> str:

@@ -7,7 +7,7 @@ from typing import Any
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.files import shown
-from opencsp_calib.gui.session import Session
+from opencsp_calib.gui.session import Session, described
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_observations
 from opencsp_calib.registry import installed
 
@@ -38,7 +38,7 @@ def take_up(session: Session, path: Path) -> None:
     session.settings = replace(session.settings, **chosen)
     session.kept = shown(session.folder, path)
     session.observations, session.found_with = found, session.asked()
-    session.describe_views()
+    session.views = described(found)
     session.say(f"Corners of {len(found.used)} views from {session.kept}: choose how to solve, then calibrate.")
 
 

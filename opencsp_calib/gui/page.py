@@ -2,8 +2,9 @@
 
 How a section is added: write a file with one function ``build(page)`` that makes its elements and returns a function
 without arguments which brings them up to date with ``page.session``; it is called whenever the session changes. Put it
-into `STEPS` (left), `RESULTS` (right, shown one at a time) or `TABS` (a tab of its own beside Calibrate) below. A
-section changes nothing itself: it calls a method of the session, which tells every page.
+into `STEPS` (left), `RESULTS` (right, shown one at a time) or `TABS` (a tab of its own beside Calibrate) below; what is
+in the last two is built when it is first shown. A section changes nothing itself: it calls a method of the session,
+which tells every page.
 """
 
 from collections.abc import Callable
@@ -123,8 +124,7 @@ class Page:
             with ui.tab_panel("Calibrate").classes("bare"):
                 self._build_calibrate()
             for name, build in TABS:
-                with ui.tab_panel(name).classes("page"):
-                    self._seldom[name] = build(self)
+                self._seldom[name] = self._when_shown(ui.tab_panel(name).classes("page"), build)
         self._pages.on_value_change(self.refresh)
         with ui.element("footer").classes("foot"):
             self._always.append(status.build(self))
@@ -141,9 +141,20 @@ class Page:
                     self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
                 with ui.tab_panels(self._results, value=RESULTS[0][0], animated=False).classes("panels"):
                     for name, build in RESULTS:
-                        with ui.tab_panel(name).classes("bare"):
-                            self._refreshers[name] = build(self)
+                        self._refreshers[name] = self._when_shown(ui.tab_panel(name).classes("bare"), build)
                 self._results.on_value_change(self.refresh)
+
+    def _when_shown(self, panel: ui.tab_panel, build: Build) -> Refresh:
+        """Build a section when it is first refreshed, so that the page does not wait for what is not seen."""
+        built: list[Refresh] = []
+
+        def refresh() -> None:
+            if not built:
+                with panel:
+                    built.append(build(self))
+            built[0]()
+
+        return refresh
 
     def refresh(self) -> None:
         """Bring what can be seen up to date."""

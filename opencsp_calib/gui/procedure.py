@@ -1,13 +1,13 @@
 """The two long steps of the procedure: finding the corners, and calibrating, with all images or without some."""
 
+import asyncio
 from collections.abc import Iterable
 from functools import partial
 
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.news import Level, Message
-from opencsp_calib.gui.session import Session
+from opencsp_calib.gui.session import Session, described
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations
-from opencsp_calib.judgement import verdict
 
 __all__ = ["calibrate", "find_and_calibrate", "find_corners", "put_back", "remove"]
 
@@ -58,10 +58,10 @@ async def _find_corners(session: Session) -> None:
             observations=str(target),
             journal=str(session.file("found", "journal")),
         )
-        found = load_observations(target)
+        found = await asyncio.to_thread(load_observations, target)
         session.observations, session.found_with = found, asked
     finally:
-        session.describe_views()
+        session.views = await asyncio.to_thread(described, session.observations)
     session.removed &= {view.image for view in found.views}
     text = f"The board is found in {len(found.used)} of {len(found.views)} photographs."
     session.message = Message(text, "good" if found.used else "bad")
@@ -74,7 +74,7 @@ async def _calibrate(session: Session) -> None:
         "record": settings.record,
         "provenance": session.selection.provenance(),
     }
-    await session.job(
+    judged = await session.job(
         "solve",
         observations=str(session.file("observations")),
         exclude=sorted(session.removed),
@@ -86,7 +86,7 @@ async def _calibrate(session: Session) -> None:
     if target.exists():
         target.replace(session.file("before"))
     new.replace(target)
-    session.before, session.calibration = session.calibration, load_calibration(target)
-    used, judged = len(session.calibration.observations.used), verdict(session.calibration)
-    text = f"Calibrated from {used} views, rms {session.calibration.rms_px:.4f} px. {judged.sentence}"
-    session.message = Message(text, LEVELS[judged.level])
+    solved = await asyncio.to_thread(load_calibration, target)
+    session.before, session.calibration = session.calibration, solved
+    text = f"Calibrated from {len(solved.observations.used)} views, rms {solved.rms_px:.4f} px. {judged['sentence']}"
+    session.message = Message(text, LEVELS[judged["level"]])

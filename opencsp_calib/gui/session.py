@@ -40,11 +40,11 @@ from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 from opencsp_calib.initial import rough_tilts
 from opencsp_calib.summary import observations_as_json
 
-__all__ = ["FOLDER", "Session"]
+__all__ = ["FOLDER", "Session", "described"]
 
 FOLDER = "opencsp-calib-session"
 VERSION = 1
-PAUSE_S = 0.2  # between two news to the pages while work goes on
+PAUSE_S = 0.5  # between two news to the pages while work goes on: a browser draws a table at the work's cost
 
 
 class Session:
@@ -237,13 +237,6 @@ class Session:
             return [self.kept]
         return [self.settings.spec, self.settings.finding, [str(file.path) for file in self.selection.files]]
 
-    def describe_views(self) -> None:
-        """Tell of each view what is known of it: of the last search that ended."""
-        seen = self.observations
-        tilts = rough_tilts(seen) if seen else {}
-        found: list[Mapping[str, Any]] = observations_as_json(seen, {}, None)["views"] if seen else []
-        self.views = {view["image"]: {**view, "tilt_deg": tilts.get(view["image"])} for view in found}
-
     # --- the disk ---
 
     def file(self, name: str, extension: str = "hdf5") -> Path:
@@ -273,8 +266,15 @@ class Session:
     def _load_results(self) -> None:
         if self.file("observations").exists():
             self.observations = load_observations(self.file("observations"))
-            self.describe_views()
+            self.views = described(self.observations)
         if self.file("calibration").exists():
             self.calibration = load_calibration(self.file("calibration"))
         if self.file("before").exists():
             self.before = load_calibration(self.file("before"))
+
+
+def described(seen: Observations | None) -> dict[str, dict[str, Any]]:
+    """What is known of each view before there is a calibration, by image."""
+    tilts = rough_tilts(seen) if seen else {}
+    found: list[Mapping[str, Any]] = observations_as_json(seen, {}, None)["views"] if seen else []
+    return {view["image"]: {**view, "tilt_deg": tilts.get(view["image"])} for view in found}

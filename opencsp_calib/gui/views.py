@@ -24,6 +24,7 @@ COLUMNS: list[dict[str, Any]] = [
     {"name": "rms", "label": "rms (px)", "field": "rms", "sortable": True},
     {"name": "problems", "label": "To know", "field": "problems", "align": "left", "classes": "wide"},
 ]
+ROW_PX = 53
 PICTURE_CELL = '<q-td :props="props"><img class="thumbnail" loading="lazy" :src="props.row.picture" alt="" /></q-td>'
 START = (
     "Describe the board on the left and select about 50 photographs of it: tilted by 30 to 45 degrees to every side, "
@@ -36,6 +37,7 @@ def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
     table = photograph_table(page, COLUMNS).props("virtual-scroll data-testid=images").classes("views")
+    table.props(f"virtual-scroll-item-size={ROW_PX}")  # else many more rows are drawn than can be seen
     table.add_slot("body-cell-picture", PICTURE_CELL)
     empty = ui.label(START).classes("quiet empty")
 

@@ -6,6 +6,7 @@ second; what it is asked and what it answers are lines of JSON; large results ar
 
 import asyncio
 import json
+import subprocess
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from typing import Any, cast
@@ -16,6 +17,7 @@ from opencsp_calib.processes import own_process
 __all__ = ["Worker"]
 
 MAX_LINE = 2**26  # bytes of one answer
+PRIORITY: int = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # of Windows; elsewhere jobs.py lowers its own
 
 
 class Worker:
@@ -33,6 +35,7 @@ class Worker:
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=MAX_LINE,
+                creationflags=PRIORITY,
             )
         return self._process
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.comparison import compare
-from opencsp_calib.judgement import REMARKS, Verdict, judge, verdict
+from opencsp_calib.judgement import REMARKS, conclusion, judge
 from opencsp_calib.quality import set_quality, view_qualities
 from opencsp_calib.report import plots
 from opencsp_calib.report.board_section import board_section
@@ -58,7 +58,7 @@ def summary(calibration: Calibration) -> str:
     """The verdict, warnings, and the figures that matter most."""
     camera, whole = calibration.camera, set_quality(calibration)
     problems = judge(calibration)
-    judged: Verdict = verdict(calibration)
+    judged = conclusion(problems)
     size = " × ".join(map(str, camera.image_size))
     facts = (
         (f"{calibration.rms_px:.4f} px", "rms of all corners"),
