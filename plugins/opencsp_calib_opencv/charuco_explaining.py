@@ -15,6 +15,7 @@ __all__ = ["why_no_charuco"]
 
 FEWEST_MARKERS, CHANCE = 3, 3  # so many, and so many times what would be read by chance, are not there by chance
 MOST_COLUMNS = 40
+MARKER_PARTS = np.arange(0.2, 0.96, 0.05)  # of a square's side
 SIZES = (4, 5, 6, 7)  # of all dictionaries, in cells
 COLOURS = {True: "white on black", False: "black on white"}
 
@@ -88,6 +89,10 @@ def _arranged_otherwise(board: CharucoBoard, markers: Markers) -> str:
     for other, advice in _variants(board):
         if laid_out(markers, other).fits:
             return f"{seen}{advice}"
+    part = _marker_part(board, markers)
+    if part is not None:
+        asked = board.marker_m / board.spacing_m
+        return f"{seen}they look about {part:.2f} of a square wide, not {asked:.2f}: measure one, and write its side"
     return f"{seen}not side by side as on a board of {board.columns}x{board.rows} squares"
 
 
@@ -102,7 +107,21 @@ def _variants(board: CharucoBoard) -> Iterator[tuple[CharucoBoard, str]]:
         yield _variant(board, number, rows, legacy), f"arranged in {number} columns of squares, not {columns}"
 
 
-def _variant(board: CharucoBoard, columns: int, rows: int, legacy: bool) -> CharucoBoard:
+def _marker_part(board: CharucoBoard, markers: Markers) -> float | None:
+    """The part of a square's side that the markers seem to take; None where the board is no such one, whatever it is.
+
+    Markers foretell a corner between them alike for all parts near the true one: it is in the middle of those.
+    """
+    fitting = []
+    for part in MARKER_PARTS:
+        other = _variant(board, board.columns, board.rows, board.legacy, part * board.spacing_m)
+        if laid_out(markers, other).fits:
+            fitting.append(part)
+    return float(np.mean(fitting)) if fitting else None
+
+
+def _variant(board: CharucoBoard, columns: int, rows: int, legacy: bool, marker_m: float | None = None) -> CharucoBoard:
+    marker_m = board.marker_m if marker_m is None else marker_m
     return CharucoBoard(
-        columns, rows, board.spacing_m, board.marker_m, board.dictionary, inverted=board.inverted, legacy=legacy
+        columns, rows, board.spacing_m, marker_m, board.dictionary, inverted=board.inverted, legacy=legacy
     )

@@ -72,6 +72,7 @@ def test_the_corners_are_those_that_opencv_finds(data_dir: Path) -> None:
         ({"dictionary": "DICT_6X6_250"}, "found 10 markers of DICT_4X4_50, none of DICT_6X6_250"),
         ({"columns": 5, "rows": 4}, "columns and rows look exchanged"),
         ({"columns": 7}, "arranged in 4 columns of squares, not 7"),
+        ({"marker_m": 0.02}, "of a square wide, not 0.37: measure one"),
     ],
 )
 def test_a_wrong_description_is_put_right(data_dir: Path, changes: dict[str, object], reason: str) -> None:
