@@ -15,11 +15,11 @@ from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.cluster import Scheduler, connected
 from opencsp_calib.corners import prepare
-from opencsp_calib.detection import Observations, Problem, View
+from opencsp_calib.detection import Detection, Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
 from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
 from opencsp_calib.journal import Journal
-from opencsp_calib.looking import Look, Search
+from opencsp_calib.looking import OTHER_BOARD, Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.process_setting import ProcessSetting, Restore
 
@@ -83,7 +83,10 @@ def look_at(
 
 
 def check_board_seen(observations: Observations) -> None:
-    """Refuse a set in which no image shows the board, with the most frequent reason.
+    """Refuse a set in which no image shows the board, or only parts of it, which may well be another board's.
+
+    A part of a smaller board looks like a part of the one that is looked for, if the rest may be out of view. So where
+    some images show another board whole, and none the board itself, its description is wrong.
 
     Raises
     ------
@@ -93,6 +96,16 @@ def check_board_seen(observations: Observations) -> None:
         reasons = [view.detection.reason for view in observations.views if view.detection.reason]
         why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
         raise InputError(f"no board to calibrate from in any of the {len(observations.views)} images: {why}")
+    others = [view for view in observations.views if any(p.code == OTHER_BOARD for p in view.problems)]
+    if others and not any(_whole(view.detection, observations.board) for view in observations.used):
+        more = f" and {len(others) - 1} more show" if len(others) > 1 else " shows"
+        raise InputError(
+            f"{others[0].image}{more} another board, and no image the whole of this one: {others[0].detection.reason}"
+        )
+
+
+def _whole(detection: Detection, board: Board) -> bool:
+    return len(detection) + len(detection.rejected) == len(board.points)
 
 
 def usable_cores() -> int:

@@ -67,6 +67,8 @@ class Detection:
     rejected : tuple of RejectedCorner
     reason : str
         Why nothing, or not all, was found.
+    other_board : bool
+        Whether nothing was found because the whole of another board is in view, with more or fewer corners.
     """
 
     ids: Ids
@@ -76,6 +78,7 @@ class Detection:
     contrast: Floats | None = None
     rejected: tuple[RejectedCorner, ...] = ()
     reason: str = ""
+    other_board: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ids", frozen_ids(self.ids, "corner ids", (None,)))
@@ -89,9 +92,9 @@ class Detection:
             raise InputError("a detection names the same corner twice")
 
     @classmethod
-    def nothing(cls, reason: str) -> "Detection":
+    def nothing(cls, reason: str, *, other_board: bool = False) -> "Detection":
         """No corner, and why."""
-        return cls(np.empty(0, dtype=np.int64), np.empty((0, 2)), reason=reason)
+        return cls(np.empty(0, dtype=np.int64), np.empty((0, 2)), reason=reason, other_board=other_board)
 
     def __len__(self) -> int:
         return len(self.ids)

@@ -19,8 +19,9 @@ from opencsp_calib.opencv import opencv_version
 from opencsp_calib.photograph import problems_of
 from opencsp_calib.subpix import refine_subpix
 
-__all__ = ["Look", "Refine", "Search", "engine_versions", "find_board"]
+__all__ = ["OTHER_BOARD", "Look", "Refine", "Search", "engine_versions", "find_board"]
 
+OTHER_BOARD = "other-board"  # the problem of a view that shows the whole of another board
 MIN_CORNERS = 6  # twelve numbers for the six of a pose: as many again to check it by
 
 Refine: TypeAlias = Literal["none", "subpix", "model"]
@@ -69,7 +70,8 @@ class Search:
             return Look.unreadable(name, str(error))
         detection = find_board(image, self.board, self.detector, self.refine)
         if not len(detection):
-            problems: tuple[Problem, ...] = (Problem("no-board", detection.reason),)
+            code = OTHER_BOARD if detection.other_board else "no-board"
+            problems: tuple[Problem, ...] = (Problem(code, detection.reason),)
             return Look(View(name, detection, "no board", problems, image.sha256), image.size)
         problems = problems_of(image, detection, self.board)
         return Look(View(name, detection, "used", problems, image.sha256), image.size)

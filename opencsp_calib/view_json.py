@@ -39,10 +39,11 @@ def view_from_json(entry: Mapping[str, Any], arrays: Mapping[str, Floats | None]
     if entry["status"] not in get_args(Status):
         raise FileFormatError(f"the view {entry['image']!r} has the unknown status {entry['status']!r}")
     rejected = tuple(RejectedCorner(int(i), (float(x), float(y)), str(why)) for i, x, y, why in entry["rejected"])
+    known: dict[str, Any] = {name: arrays[name] for name in OPTIONAL}
     detection = Detection(
         np.asarray(arrays["ids"]).astype(np.int64),
         np.asarray(arrays["pixels"]),
-        **{name: arrays[name] for name in OPTIONAL},
+        **known,
         rejected=rejected,
         reason=str(entry["reason"]),
     )

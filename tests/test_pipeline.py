@@ -19,11 +19,12 @@ from opencsp_calib import (
     Image,
     InputError,
     Observations,
+    Problem,
     calibrate,
     detect,
     solve,
 )
-from opencsp_calib.detecting import look_at
+from opencsp_calib.detecting import check_board_seen, look_at
 from opencsp_calib.dropping import drop_above, drop_worst, excluding
 from opencsp_calib.errors import CancelledError
 from opencsp_calib.images import find_images
@@ -160,6 +161,21 @@ def test_no_board_says_the_commonest_reason(tmp_path: Path, small_world: SmallWo
     )
     with pytest.raises(InputError, match="any of the 12 images: too dark"):
         solve(Observations(Checkerboard(9, 6, 0.03), (640, 480), nothing))
+
+
+def test_parts_of_a_smaller_board_are_not_taken_for_those_of_the_one_asked_for(small_world: SmallWorld) -> None:
+    """Squares counted instead of corners: near the image's border, the smaller board may be part of the larger."""
+    columns, rows = small_world.board.grid
+    asked = Checkerboard(columns + 1, rows + 1, small_world.board.spacing_m)
+    views = observe(small_world.camera, small_world.board, small_world.poses).views
+    parts = Observations(asked, (640, 480), views)
+    whole = Detection.nothing(f"has {columns}x{rows} inner corners", other_board=True)
+    other = replace(views[0], image="whole.png", detection=whole, status="no board")
+    problems = (Problem("other-board", whole.reason),)
+    check_board_seen(parts)
+    with pytest.raises(InputError, match="shows another board, and no image the whole of this one: has 9x6"):
+        solve(replace(parts, views=(*views, replace(other, problems=problems))))
+    check_board_seen(replace(parts, board=small_world.board, views=(*views, replace(other, problems=problems))))
 
 
 class Counting:

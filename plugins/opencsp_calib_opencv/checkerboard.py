@@ -7,7 +7,7 @@ from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.available import missing_opencv
-from opencsp_calib_opencv.explaining import emptiness, two_boards, why_not_placed
+from opencsp_calib_opencv.explaining import emptiness, not_placed, two_boards
 from opencsp_calib_opencv.grid import known
 from opencsp_calib_opencv.levels import levels
 from opencsp_calib_opencv.margins import sides_seen
@@ -66,7 +66,8 @@ class CheckerboardDetector:
                 largest, whole = grids[0], all(sides_seen(level.grey, grids[0]))
         if len(best):
             return best
-        return Detection.nothing(emptiness(image) or why_not_placed(board, largest, whole))
+        empty = emptiness(image)
+        return Detection.nothing(empty) if empty else not_placed(board, largest, whole)
 
 
 def _incomplete(found: int, board: Board) -> str:

@@ -4,10 +4,11 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board
+from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.grid import known
 
-__all__ = ["emptiness", "two_boards", "why_not_placed"]
+__all__ = ["emptiness", "not_placed", "two_boards"]
 
 SAMPLE_STEP = 7  # pixels: a hundredth of the image tells whether there is anything in it
 FLAT = 0.02  # of the image's range, from the 1st to the 99th percentile
@@ -27,8 +28,8 @@ def emptiness(image: Image) -> str | None:
     return "the image is blank: all of it is one grey"
 
 
-def why_not_placed(board: Board, grid: Floats | None, whole: bool) -> str:
-    """What the largest grid of corners that was found means for somebody who looks for the board.
+def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
+    """Nothing, and what the largest grid of corners that was found means for somebody who looks for the board.
 
     Parameters
     ----------
@@ -39,18 +40,20 @@ def why_not_placed(board: Board, grid: Floats | None, whole: bool) -> str:
     """
     wanted = f"{board.columns}x{board.rows}"
     if grid is None or known(grid).sum() < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
-        return f"no {wanted} checkerboard was found"
+        return Detection.nothing(f"no {wanted} checkerboard was found")
     small, large = sorted(grid.shape[:2])
     least, most = sorted(board.grid)
     found = f"{large}x{small}" if board.columns >= board.rows else f"{small}x{large}"
+    other = whole or small > least or large > most
     if (small + 1, large + 1) == (least, most):
-        return (
+        return Detection.nothing(
             f"the checkerboard found has {found} inner corners, not {wanted}, which counts its squares; "
-            f"inner corners are one less each way: write {board.kind}:{found}"
+            f"inner corners are one less each way: write {board.kind}:{found}",
+            other_board=other,
         )
-    if whole or small > least or large > most:
-        return f"the checkerboard found has {found} inner corners, not {wanted}"
-    return (
+    if other:
+        return Detection.nothing(f"the checkerboard found has {found} inner corners, not {wanted}", other_board=True)
+    return Detection.nothing(
         f"only {found} corners in a block were found of {wanted}, and which ones cannot be told; "
         "show the whole board, or all of it one way and its white margin the other"
     )

@@ -78,6 +78,7 @@ def test_what_is_no_board_has_a_reason(kind: str) -> None:
 def test_another_board_is_named(grid: tuple[int, int], reason: str) -> None:
     detection = find(Photograph.of(BOARD, scene=PLAIN).image, Checkerboard(*grid, 0.05))
     assert len(detection) == 0
+    assert detection.other_board
     assert reason in detection.reason
 
 
