@@ -56,7 +56,7 @@ mutants: $(VENV)/.dev
 	$(BIN)/python validation/bench.py mutants
 
 coverage: $(VENV)/.dev
-	$(BIN)/python -m pytest $(PARALLEL) --cov=opencsp_calib --cov-report=term-missing:skip-covered --cov-fail-under=95
+	$(BIN)/python validation/bench.py lines_tested
 
 # Wheel and sdist into dist/, and the wheel with all its extras at work in a clean environment.
 release: $(VENV)/.dev

@@ -1,6 +1,8 @@
 """Has worked out in the background what the photographs taken so far tell, while the live picture goes on.
 
-In a process of its own: its many small steps would take Python's lock from the thread that looks at the frames.
+In a process of its own: its many small steps would take Python's lock from the thread that looks at the frames. Not in
+one of a `ProcessPoolExecutor`, which cannot be ended in mid-work, outlives a killed capture, and imports a person's
+script a second time.
 """
 
 import pickle
@@ -68,7 +70,7 @@ class Learner:
 
     def close(self) -> None:
         """Stop, whatever is running."""
-        self._process.kill()
+        self._process.terminate()
         self._waiting.shutdown(cancel_futures=True)  # what waits for an answer is told that there is none
         with suppress(OSError):  # it would still write what the process never read
             self._process.communicate()
