@@ -25,7 +25,7 @@ PARALLEL_DEG = (
 TILT_WANTED_DEG = (30.0, 45.0)
 FEW_VIEWS = 10
 COVERAGE_WANTED = 0.5
-ASPECT_SIGMAS = 3.0
+ASPECT_SIGMAS, LEAST_ASPECT = 3.0, 1e-5  # of fx: less matters to nobody, and no board is as true to size
 RANGE_SPREAD = 1.1
 DISQUALIFYING = ("poor-rms", "not-converged", "head-on", "parallel", "fold-inside")
 REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
@@ -172,10 +172,10 @@ def _aspect(calibration: Calibration) -> Problem | None:
     fx, fy = calibration.camera.params[:2]
     (a, b), (_, d) = calibration.covariance[:2, :2]
     sigma = np.sqrt(max(a + d - 2 * b, 0.0))
-    if not (sigma > 0 and abs(fx - fy) > ASPECT_SIGMAS * sigma):
+    if not (sigma > 0 and abs(fx - fy) > max(ASPECT_SIGMAS * sigma, LEAST_ASPECT * fx)):
         return None
     message = (
-        f"fx and fy differ by {fx - fy:+.2f} px, which is known to {sigma:.2g} px (they are known together, not one by "
+        f"fx and fy differ by {fx - fy:+.3g} px, which is known to {sigma:.2g} px (they are known together, not one by "
         "one); most sensors have square pixels, so the board's spacing may differ in x and y: solve for its shape, or "
         "measure it"
     )

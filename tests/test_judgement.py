@@ -91,6 +91,11 @@ def test_unequal_focal_lengths_are_said_only_beyond_their_sigmas() -> None:
     assert "fx-fy-differ" in codes(result(WORLD.poses, camera=replace(WORLD.camera, params=off)))
     off[0] -= 2.5
     assert "fx-fy-differ" not in codes(result(WORLD.poses, camera=replace(WORLD.camera, params=off)))
+    certain = {"covariance": np.diag(SIGMA**2) * 1e-8}
+    for ratio, said in ((1.00002, True), (1.000009, False)):  # a hundredth of a thousandth matters to nobody
+        off[0] = ratio * off[1]
+        camera = replace(WORLD.camera, params=off)
+        assert ("fx-fy-differ" in codes(replace(result(WORLD.poses, camera=camera), **certain))) == said
 
 
 def test_distortion_that_folds_inside_the_image_is_bad() -> None:
