@@ -51,9 +51,10 @@ def test_one_newton_step_finds_what_solving_again_without_each_view_finds(way: s
         poses = seed_poses(BOARD, CAMERA, 14, 3)
         observations = observe(CAMERA, BOARD, poses, noise_px=0.05, rng=4)
     whole = solved(observations, options)
-    again = [solved(rest, options).camera.params for rest in leaving_each_out(observations)]
+    every_other = slice(None, None, 2)
+    again = [solved(rest, options).camera.params for rest in leaving_each_out(observations)[every_other]]
     again = np.array(again) - whole.camera.params
-    steps = np.array([one.params for one in influence(whole)])
+    steps = np.array([one.params for one in influence(whole)])[every_other]
     assert (np.abs(steps - again) < 0.02 * np.abs(again).max(axis=0)).all()
     full = np.sqrt(np.diag(jackknife_covariance(again)))
     assert np.sqrt(np.diag(jackknife_covariance(steps))) == pytest.approx(full, rel=0.01)
@@ -63,12 +64,10 @@ def test_one_newton_step_finds_what_solving_again_without_each_view_finds(way: s
 def test_the_residual_covariance_is_the_scatter_of_worlds_whose_noise_is_independent(way: str) -> None:
     board = Checkerboard(6, 5, 0.1)
     poses = seed_poses(board, CAMERA, 8, 3)
-    params, sigmas = [], []
-    for seed in range(25):
-        result = with_uncertainty(solved(observe(CAMERA, board, poses, noise_px=0.1, rng=seed), WAYS[way]))
-        params.append(result.camera.params)
-        sigmas.append(np.sqrt(np.diag(result.covariance_residual)))
-    scatter = np.sqrt(np.mean((np.array(params) - CAMERA.params) ** 2, axis=0))
+    results = [solved(observe(CAMERA, board, poses, noise_px=0.1, rng=seed), WAYS[way]) for seed in range(25)]
+    scatter = np.sqrt(np.mean([(one.camera.params - CAMERA.params) ** 2 for one in results], axis=0))
+    # what a world's noise changes in its sigmas is their scale, known to 3 %
+    sigmas = [np.sqrt(np.diag(with_uncertainty(one).covariance_residual)) for one in results[:4]]
     # the scatter of 25 worlds is known to 14 %, one sigma; eight parameters
     assert scatter / np.mean(sigmas, axis=0) == pytest.approx(np.ones(8), abs=0.42)
 
@@ -139,9 +138,12 @@ def test_honest_is_the_jackknife_and_on_the_whole_not_below_the_residual_one(see
 
 
 def test_is_honest_where_boards_flex_and_the_residual_sigma_is_not() -> None:
-    """Student's t times sigma holds 95 %: of 24 worlds x 8 parameters, correlated within a world."""
+    """Student's t times sigma holds 95 %: of 12 worlds x 8 parameters, correlated within a world.
+
+    200 worlds each are in ``validation/uncertainty.py``.
+    """
     honest, naive = [], []
-    for seed in range(24):
+    for seed in range(12):
         poses = seed_poses(BOARD, CAMERA, 10, seed)
         result = with_uncertainty(solved(observe(CAMERA, BOARD, poses, noise_px=0.03, rng=seed, flex_m=3e-4)))
         off = np.abs(result.camera.params - CAMERA.params) / student_factor(10)
@@ -175,11 +177,9 @@ def test_a_view_that_the_result_hangs_on_is_named() -> None:
 
 
 def test_a_good_set_hangs_on_no_view() -> None:
-    hanging = 0
-    for seed in range(6):
+    for seed in range(3):
         seen = observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, 20, seed), noise_px=0.05, rng=seed)
-        hanging += any(p.code == "hangs-on-view" for p in with_uncertainty(solved(seen)).problems)
-    assert hanging == 0
+        assert not any(p.code == "hangs-on-view" for p in with_uncertainty(solved(seen)).problems)
 
 
 def test_known_uncertainty_is_not_computed_again(observations: Observations) -> None:
