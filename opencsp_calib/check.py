@@ -5,14 +5,18 @@ afresh from the same photographs, and the two are compared by projection: at the
 infinity. At one range a shift of the frame makes up for nearly all of another focal length (for 0.5 % of it, on a
 camera as Sandia's, the difference is within the noise), so that the range alone would call a refocused lens good; at
 infinity nothing makes up for it.
+
+A few photographs do not determine a board's shape. Where it was solved for together with the camera, and explains them
+better than the board as given, they are solved with it: a board that is not flat would make a good camera look wrong.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
+from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference, compare
@@ -21,7 +25,7 @@ from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.pose_fit import pose_residuals
 from opencsp_calib.projection_sigma import camera_sigma_map, sigma_map
 from opencsp_calib.resampling import Solve
-from opencsp_calib.uncertainty import with_uncertainty
+from opencsp_calib.uncertainty import student_factor, with_uncertainty
 
 __all__ = ["Check", "Judged", "Verdict", "check", "judged", "worse"]
 
@@ -31,6 +35,7 @@ SEVERITY: tuple[Verdict, ...] = ("ok", "degraded", "wrong")
 OK_SIGMAS = 2.0
 WRONG_SIGMAS = 5.0
 WRONG_PX = 1.0
+OF_MANY_VIEWS = 1.96  # what `student_factor` tends to: a sigma from few views is itself uncertain
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +47,7 @@ class Judged:
     difference : Difference
         From the fresh camera to the one checked, frames aligned.
     predicted_px : float
-        One sigma of its rms over the image.
+        One sigma of its rms over the image; larger where it comes from few views, as Student's t has it.
     """
 
     difference: Difference = field(repr=False)
@@ -54,15 +59,22 @@ class Judged:
         return self.difference.rms_px / self.predicted_px
 
     @property
+    def too_weak(self) -> bool:
+        """Whether two sigmas are more than a pixel."""
+        return OK_SIGMAS * self.predicted_px > WRONG_PX
+
+    @property
     def verdict(self) -> Verdict:
         """``ok``: no farther off than two sigmas; ``wrong``: beyond five, or by more than 1 px; else ``degraded``.
 
-        Where the photographs are so few that two sigmas are more than a pixel, they cannot say that it is ok.
+        Where the photographs are so few that two sigmas are more than a pixel, a pixel says neither that it is ok nor
+        that it is wrong.
         """
         off_by_a_pixel = self.difference.worst_px > WRONG_PX
         if self.sigmas <= OK_SIGMAS:
             return "degraded" if off_by_a_pixel else "ok"
-        return "wrong" if self.sigmas > WRONG_SIGMAS or off_by_a_pixel else "degraded"
+        telling = off_by_a_pixel and not self.too_weak
+        return "wrong" if self.sigmas > WRONG_SIGMAS or telling else "degraded"
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +113,7 @@ class Check:
     @property
     def problems(self) -> tuple[Problem, ...]:
         """What a person should know: what is said of the fresh solution, and where it is too weak to judge by."""
-        if not OK_SIGMAS * self.decisive.predicted_px > WRONG_PX:
+        if not self.decisive.too_weak:
             return self.fresh.problems
         message = (
             f"these photographs determine the camera to {self.decisive.predicted_px:.2g} px only, too little to judge "
@@ -135,7 +147,14 @@ class Check:
         }
 
 
-def check(camera: Camera, observations: Observations, solve: Solve, *, covariance: Matrix | None = None) -> Check:
+def check(
+    camera: Camera,
+    observations: Observations,
+    solve: Solve,
+    *,
+    covariance: Matrix | None = None,
+    solved_board: Board | None = None,
+) -> Check:
     """Hold a camera against new photographs.
 
     Parameters
@@ -148,6 +167,8 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
         Makes the fresh calibration; its lens model may be another.
     covariance : (P, P), optional
         Of the camera checked, where it is known: its uncertainty explains a part of the difference.
+    solved_board : Board, optional
+        As it was solved together with the camera checked.
 
     Raises
     ------
@@ -159,7 +180,7 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
     if camera.image_size != observations.image_size:
         sizes = " but the camera is for ".join(f"{w}x{h}" for w, h in (observations.image_size, camera.image_size))
         raise InputError(f"the photographs are {sizes}: they are not from this camera, or were resized")
-    fresh = solve(observations)
+    fresh = _solved_with(solved_board, observations, solve)
     if not np.isfinite(fresh.covariance).all():
         fresh = with_uncertainty(fresh)
     if not np.isfinite(fresh.covariance).all():
@@ -167,6 +188,25 @@ def check(camera: Camera, observations: Observations, solve: Solve, *, covarianc
         raise CalibrationFailedError(f"no fresh solution to check against: {said}")
     at_range, at_infinity = judged(camera, fresh, covariance)
     return Check(camera, fresh, at_range, at_infinity, _view_rms(camera, fresh))
+
+
+def _solved_with(known: Board | None, observations: Observations, solve: Solve) -> Calibration:
+    """The fresh solution, with the board as it was solved before where that explains the photographs better."""
+    fresh, given = solve(observations), observations.board
+    if fresh.options.board_shape != "flat" or known is None or np.array_equal(known.points, given.points):
+        return fresh
+    if not (known.nominal_points.shape == given.points.shape and np.allclose(known.nominal_points, given.points)):
+        return fresh
+    other = solve(observations.with_board(known))
+    if not other.rms_px < fresh.rms_px:
+        return fresh
+    message = (
+        "the board was taken as it was solved together with this camera, because these photographs do not tell its "
+        "shape and it explains them better than a flat board: errors that the camera and that board share do not show; "
+        "with more photographs, the board turned and tilted, its shape would be solved for again"
+    )
+    kept = tuple(problem for problem in other.problems if problem.code != "board-as-given")
+    return replace(other, problems=(*kept, Problem("board-solved-before", message)))
 
 
 def judged(camera: Camera, fresh: Calibration, covariance: Matrix | None = None) -> tuple[Judged, Judged]:
@@ -184,7 +224,8 @@ def worse(*found: Judged) -> Judged:
 
 
 def _predicted(camera: Camera, fresh: Calibration, covariance: Matrix | None, range_m: float | None) -> float:
-    predicted = sigma_map(fresh, range_m).rms_px
+    views = len(fresh.cam_from_board)
+    predicted = sigma_map(fresh, range_m).rms_px * student_factor(views) / OF_MANY_VIEWS
     if covariance is None or not np.isfinite(covariance).all():
         return predicted
     return float(np.hypot(predicted, camera_sigma_map(camera, covariance, range_m).rms_px))

@@ -17,7 +17,7 @@ from opencsp_calib import (
 )
 from opencsp_calib.check import Judged, check
 from opencsp_calib.comparison import Difference
-from opencsp_calib.synthetic import demo_camera, observe, seed_poses
+from opencsp_calib.synthetic import bowed, demo_camera, observe, seed_poses
 
 BOARD = Checkerboard(9, 6, 0.1)
 CAMERA = demo_camera()
@@ -88,6 +88,8 @@ def test_the_rule() -> None:
     assert verdict_of(0.051, 0.1, 0.01) == "wrong"
     assert verdict_of(0.3, 1.1, 0.1) == "wrong"
     assert verdict_of(0.9, 1.1, 0.8) == "degraded"  # too few photographs to call it ok
+    assert verdict_of(1.7, 2.5, 0.8) == "degraded"  # or wrong
+    assert verdict_of(4.1, 5.0, 0.8) == "wrong"
 
 
 def test_the_uncertainty_of_the_camera_itself_counts_where_it_is_known() -> None:
@@ -96,6 +98,21 @@ def test_the_uncertainty_of_the_camera_itself_counts_where_it_is_known() -> None
     known = check(changed(k1=0.004), photographed(noise_px=0.02), solve, covariance=covariance)
     assert known.decisive.predicted_px > 3 * alone.decisive.predicted_px
     assert (alone.verdict, known.verdict) == ("wrong", "ok")
+
+
+def test_a_bent_board_does_not_make_a_good_camera_wrong_where_its_shape_was_solved_for() -> None:
+    bent, poses = bowed(BOARD, 0.002), seed_poses(BOARD, CAMERA, 6, 4)
+    few = observe(CAMERA, bent, poses, noise_px=0.05, rng=4, nominal=BOARD)
+    assert check(CAMERA, few, solve).verdict != "ok"
+    found = check(CAMERA, few, solve, solved_board=bent)
+    assert found.verdict == "ok"
+    assert "board-solved-before" in {problem.code for problem in found.problems}
+    assert check(changed(fx=13.5, fy=13.5), few, solve, solved_board=bent).verdict == "wrong"
+    flat = check(CAMERA, photographed(), solve, solved_board=bent)  # of another board
+    assert flat.fresh.board.points is not bent.points
+    assert flat.verdict == "ok"
+    larger = Checkerboard(9, 6, 0.2)
+    assert check(CAMERA, photographed(), solve, solved_board=bowed(larger, 0.002)).verdict == "ok"
 
 
 def test_what_it_says() -> None:

@@ -67,8 +67,13 @@ def check(
     known = camera_in(camera, name, image_size)
     calibration = calibration_in(camera)
     observations = _observed(images, board, jobs, calibration.observations.board if calibration else None)
-    covariance = calibration.covariance if calibration else None
-    found = checked(known, observations, lambda views: pipeline.solve(views, known.model), covariance=covariance)
+    found = checked(
+        known,
+        observations,
+        lambda views: pipeline.solve(views, known.model),
+        covariance=calibration.covariance if calibration else None,
+        solved_board=calibration.board if calibration else None,
+    )
     say(f"{known.name}: {found.verdict}")
     for reason in found.reasons:
         say(reason)
@@ -108,8 +113,8 @@ def _calibration(images: list[str], board: str | None, jobs: int | None) -> "Cal
 def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Board | None" = None) -> "Observations":
     """What is seen in photographs, by default of the board that the camera was calibrated with; or what a file says.
 
-    That board is taken as it was given, not as it was solved: a shape solved together with the camera shares its
-    errors, and would hide them.
+    That board is taken as it was given: a shape solved together with the camera shares its errors, and is only the
+    second choice (see `opencsp_calib.check`).
     """
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
