@@ -192,7 +192,8 @@ def solve(
     decides = board_shape == "auto" and "board_free" in engine.abilities
     with blas_on_one_thread():
         solving = shapes.decide if decides else shapes.solve_with_aspect
-        solved = with_uncertainty(solving(observations, options, run, aspect_given=pixel_aspect is not None))
+        as_it_is = pixel_aspect is not None or "pixel_aspect" not in engine.abilities
+        solved = with_uncertainty(solving(observations, options, run, aspect_given=as_it_is))
     return replace(
         solved,
         camera=replace(solved.camera, name=name),
@@ -280,7 +281,7 @@ def _check_views(observations: Observations) -> None:
     used, looked_at = len(observations.used), len(observations.views)
     if used < MIN_VIEWS:
         raise InputError(
-            f"the board is found in only {used} of {looked_at} images; a calibration needs at least {MIN_VIEWS} views, "
+            f"only {used} of {looked_at} images can be used; a calibration needs at least {MIN_VIEWS} views, "
             "better about 50"
         )
     # the same pose again adds no information: a solver would fail, or worse, not fail

@@ -9,7 +9,7 @@ import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -25,8 +25,15 @@ from opencsp_calib.resampling import known_corners
 from opencsp_calib.trials import LADDER, Trials
 from opencsp_calib.uncertainty import student_factor
 
-__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "Pair", "SolverResult", "Validation", "validate"]
+__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "SENTENCES", "Pair", "SolverResult", "Validation", "Verdict", "validate"]
 
+Verdict: TypeAlias = Literal["agree", "disagree", "not compared"]
+SENTENCES: Mapping[Verdict, str] = {
+    "agree": "The solvers agree.",
+    "disagree": "The solvers do not agree: do not use this calibration.",
+    "not compared": "The solvers were not compared: fewer than two could run.",
+}
+"""What each verdict says to people."""
 AGREE_PX = 1e-3
 """Solvers of the same problem agree to 1e-4 px or better; a thousandth cannot come from rounding."""
 LIKE_WITH_LIKE = SolveOptions()
@@ -113,8 +120,10 @@ class Validation:
     reasons: tuple[str, ...]
 
     @property
-    def verdict(self) -> Literal["agree", "disagree"]:
-        """Of the solvers."""
+    def verdict(self) -> Verdict:
+        """Of the solvers; fewer than two that could run prove nothing."""
+        if not self.pairs:
+            return "not compared"
         return "agree" if all(pair.agree for pair in self.pairs) else "disagree"
 
     @property

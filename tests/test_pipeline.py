@@ -28,8 +28,9 @@ from opencsp_calib.detecting import check_board_seen, look_at
 from opencsp_calib.dropping import drop_above, drop_worst, excluding
 from opencsp_calib.errors import CancelledError
 from opencsp_calib.images import find_images
+from opencsp_calib.judgement import judge
 from opencsp_calib.looking import Search
-from opencsp_calib.synthetic import observe
+from opencsp_calib.synthetic import demo_camera, observe, random_poses
 
 SCRIPT = """
 from opencsp_calib import Camera, Checkerboard, calibrate, compare, detect, solve
@@ -207,3 +208,14 @@ def test_no_more_images_are_in_memory_than_are_looked_at(photographs: Path) -> N
     found = look_at(files, Search(Checkerboard(9, 6, 0.03), detector, "none"), jobs=2)
     assert detector.looked == len(found.views) == 60
     assert detector.most <= 3  # one each, and one that is being handed over
+
+
+def test_a_solver_that_cannot_hold_the_pixel_aspect_is_not_made_to() -> None:
+    """All views the same way up: square pixels would be assumed, which COLMAP cannot; then the aspect stays open."""
+    pytest.importorskip("pycolmap")
+    board, camera = Checkerboard(9, 6, 0.1), demo_camera()
+    poses = random_poses(board, camera, 12, 3, tilt_deg=(25, 45), roll_deg=(-5, 5), fill=(0.5, 0.9))
+    seen = observe(camera, board, poses, noise_px=0.02, rng=3)
+    found = solve(seen, solver="colmap", board_shape="free")
+    assert found.options.pixel_aspect is None
+    assert "one-orientation" in {problem.code for problem in judge(found)}

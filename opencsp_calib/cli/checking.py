@@ -46,7 +46,7 @@ def validate(
         say(f"report saved: {report}")
     if json:
         print_json(found.as_json())
-    if found.verdict == "disagree":
+    if found.verdict == "disagree" or (len(engines) > 1 and not found.pairs):  # those asked for could not run
         raise typer.Exit(1)
 
 
@@ -132,6 +132,8 @@ def _is_file(images: list[str]) -> bool:
 
 
 def _say_validation(found: "Validation") -> None:
+    from opencsp_calib.validate import SENTENCES
+
     rows = [
         (result.name, result.version, f"{result.calibration.rms_px:.4f} px", f"{result.seconds:.2f} s")
         for result in found.solvers
@@ -142,6 +144,6 @@ def _say_validation(found: "Validation") -> None:
         for pair in found.pairs
     ]
     say_table(("difference over the image", "rms", "worst"), differences)
-    say(f"verdict: the solvers {found.verdict}; what else there is to know:")
+    say(SENTENCES[found.verdict])
     for reason in found.reasons[:MAX_SHOWN]:
         say(f"- {reason}")

@@ -47,7 +47,9 @@ def build(page: "Page") -> Callable[[], None]:
 
 
 async def _validate(session: Session) -> None:
+    from opencsp_calib.validate import SENTENCES
+
     verdict = await session.job(
         "validate", calibration=str(session.file("calibration")), sections=str(session.file("validation", "html"))
     )
-    session.message = Message(f"The solvers {verdict}.", "good" if verdict == "agree" else "bad")
+    session.message = Message(SENTENCES[verdict], "good" if verdict == "agree" else "bad")

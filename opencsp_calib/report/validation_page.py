@@ -8,7 +8,7 @@ from opencsp_calib.report.document import write_document
 from opencsp_calib.report.figures import as_image
 from opencsp_calib.report.html import table
 from opencsp_calib.report.plots import difference_plot
-from opencsp_calib.validate import Validation
+from opencsp_calib.validate import SENTENCES, Validation
 
 __all__ = ["validation_sections", "write_validation"]
 
@@ -33,7 +33,7 @@ def validation_sections(validation: Validation) -> tuple[str, ...]:
 
 def _verdict(validation: Validation, name: str) -> str:
     level = "good" if validation.verdict == "agree" else "bad"
-    sentence = "The solvers agree." if level == "good" else "The solvers do not agree: do not use this calibration."
+    sentence = SENTENCES[validation.verdict]
     reasons = "".join(f"<li>{escape(reason)}</li>" for reason in validation.reasons)
     return f'<h1>Validation of {escape(name)}</h1><div class="verdict {level}">{sentence}</div><ul>{reasons}</ul>'
 
