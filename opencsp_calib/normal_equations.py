@@ -189,15 +189,14 @@ class NormalEquations:
         return corner_gauge, pose_gauge
 
 
-def normal_equations(calibration: Calibration) -> NormalEquations:
+def normal_equations(calibration: Calibration, table: CornerTable | None = None) -> NormalEquations:
     """The normal equations of any solver's calibration, at its solution, without its outliers.
 
     What was solved for and how corners were weighted is taken from its options. Where the board's shape is free,
-    corners seen in one view only tell nothing about the camera and are left out.
+    corners seen in one view only tell nothing about the camera and are left out. The table of all corners, weighted
+    so, can be given where it is there already.
     """
-    seen = zip(calibration.observations.detections, calibration.outliers, strict=True)
-    detections = [detection.keeping(~outliers) if outliers.any() else detection for detection, outliers in seen]
-    table = CornerTable.of(detections, calibration.options.weights)
+    table = table or _table(calibration)
     corners = solvable_corners(table, len(calibration.board.points))
     camera = calibration.camera
     unknowns = Unknowns.of(camera.lens, calibration.observations.board, corners, calibration.options)
@@ -207,6 +206,12 @@ def normal_equations(calibration: Calibration) -> NormalEquations:
     equations = linearise(camera.lens, table, estimate, unknowns)
     conditioned = well_conditioned(equations)
     return equations if conditioned is unknowns else linearise(camera.lens, table, estimate, conditioned)
+
+
+def _table(calibration: Calibration) -> CornerTable:
+    seen = zip(calibration.observations.detections, calibration.outliers, strict=True)
+    detections = [detection.keeping(~outliers) if outliers.any() else detection for detection, outliers in seen]
+    return CornerTable.of(detections, calibration.options.weights)
 
 
 def well_conditioned(equations: NormalEquations) -> Unknowns:

@@ -26,6 +26,7 @@ from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["CornersKept", "Factorisation", "PosesKept", "factorise"]
 
+STRIP = 256  # rows of a product made at once
 TOGETHER = 32  # views whose poses are eliminated at once: matrices large enough for BLAS
 
 
@@ -169,7 +170,9 @@ class CornersKept(Factorisation):
         reduced[:corners, corners:], reduced[corners:, :corners] = ties, ties.T
         reduced[corners:, corners:] = _damped(equations.shared.sum(axis=0), damping)
         for coupling in _couplings(equations, inverse_roots):
-            reduced -= coupling.T @ coupling
+            for first in range(0, coupling.shape[1], STRIP):  # the whole product would be as large as what it is for
+                strip = slice(first, first + STRIP)
+                reduced[strip] -= coupling[:, strip].T @ coupling
         gauge = equations.gauge()[0].transpose(1, 0, 2).reshape(corners, 7)
         return cls(equations, inverse_roots, *_scaled_root(reduced, gauge))
 
@@ -229,7 +232,7 @@ def _block_diagonal(blocks: Floats) -> Matrix:
 def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     """Scale and lower Cholesky factor of a dense matrix, with the gauge's projector added; see `Factorisation`.
 
-    The matrix is overwritten: it may be the largest thing in memory.
+    The matrix is overwritten, as by `CholeskyRoot.of`.
     """
     diagonal = np.diag(dense)
     if not (diagonal > 0).all():

@@ -24,7 +24,7 @@ from opencsp_calib.arrays import Floats, Params
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.leaving_out import camera_without_each_view
-from opencsp_calib.normal_equations import normal_equations
+from opencsp_calib.normal_equations import NormalEquations, normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.projection_sigma import Alignment
 from opencsp_calib.resampling import half_steps
@@ -94,13 +94,11 @@ def evidence_of(given: Calibration, shape: SolveOptions) -> Evidence:
         If the views, or half of them, do not determine the shape.
     """
     camera = _with_aspect(given.camera, shape.pixel_aspect)
-    flat, free = normal_equations(given), normal_equations(replace(given, camera=camera, options=shape))
-    solved = factorise(free)
-    step = solved.newton_step()
-    moved = camera.params - given.camera.params + free.unknowns.of_camera(step[0])
-    by_chance = camera_without_each_view(solved, ahead=step, tolerance=CLOSE) - camera_without_each_view(
-        factorise(flat)
-    )
+    flat = normal_equations(given)
+    table = flat.table if shape.weights == given.options.weights else None
+    free = normal_equations(replace(given, camera=camera, options=shape), table)
+    step, by_chance = _move(flat, free)
+    moved = camera.params - given.camera.params + step
     seen = Alignment.at_infinity(given.camera).grid_jacobian
 
     def over_image(change: Params) -> float:
@@ -109,6 +107,14 @@ def evidence_of(given: Calibration, shape: SolveOptions) -> Evidence:
     sigma = np.sqrt(np.einsum("nip,pq,niq->n", seen, jackknife_covariance(by_chance), seen).mean())
     given_halves, solved_halves = (over_image(_between(half_steps(equations))) for equations in (flat, free))
     return Evidence(given_halves, solved_halves, over_image(moved), float(sigma))
+
+
+def _move(flat: NormalEquations, free: NormalEquations) -> tuple[Params, Floats]:
+    """A step (P,) of the camera towards the board's shape; (V, P) how each view, left out, changes it from none."""
+    solved = factorise(free)  # with many views the largest thing in memory: gone before the halves have theirs
+    step = solved.newton_step()
+    left_out = camera_without_each_view(solved, ahead=step, tolerance=CLOSE)
+    return free.unknowns.of_camera(step[0]), left_out - camera_without_each_view(factorise(flat))
 
 
 def _between(halves: Floats) -> Params:

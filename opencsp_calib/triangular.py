@@ -31,22 +31,23 @@ class CholeskyRoot:
 
     @classmethod
     def of(cls, matrix: Matrix) -> "CholeskyRoot":
-        """The root of a positive definite matrix (n, n).
+        """The root of a positive definite matrix (n, n), left in its place: it may be the largest thing in memory.
 
         Raises
         ------
         numpy.linalg.LinAlgError
             If it is not, to working precision.
         """
-        lower, inverses = np.zeros_like(matrix), []
+        inverses = []
         for first in range(0, len(matrix), BLOCK):
             end = min(first + BLOCK, len(matrix))
-            left = matrix[first:, first:end] - lower[first:, :first] @ lower[first:end, :first].T
+            left = matrix[first:, first:end] - matrix[first:, :first] @ matrix[first:end, :first].T
             root = np.linalg.cholesky(left[: end - first])
             inverses.append(np.asarray(np.linalg.inv(root), dtype=np.float64))
-            lower[first:end, first:end] = root
-            lower[end:, first:end] = left[end - first :] @ inverses[-1].T
-        return cls(lower, tuple(inverses))
+            matrix[first:end, first:end] = root
+            matrix[first:end, end:] = 0.0
+            matrix[end:, first:end] = left[end - first :] @ inverses[-1].T
+        return cls(matrix, tuple(inverses))
 
     def solve(self, right: Floats) -> Floats:
         """Solutions x of ``L Lᵀ x = right``, (n, R)."""

@@ -88,12 +88,7 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     if np.isfinite(calibration.covariance).all() or {p.code for p in calibration.problems} & UNKNOWN:
         return calibration
     try:
-        equations = normal_equations(calibration)
-        if equations.dof <= 0:
-            raise np.linalg.LinAlgError("no more observations than unknowns")
-        factor = factorise(equations)
-        residual = factor.camera_covariance * max(equations.cost / equations.dof, ROUNDING**2)
-        steps = camera_without_each_view(factor)
+        residual, steps, basis = _linearised(calibration)
     except np.linalg.LinAlgError as error:
         message = f"the views do not determine the camera ({error}): take more of them, from different directions"
         return calibration.with_problems(Problem("undetermined", message))
@@ -101,11 +96,21 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     unknown = _why_unknown(calibration, steps)
     if unknown:
         return calibration.with_problems(unknown)
-    honest = honest_covariance(residual, jackknife_covariance(steps), equations.unknowns.camera)
+    honest = honest_covariance(residual, jackknife_covariance(steps), basis)
     calibration = replace(calibration, covariance=honest)
     jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
     hangs = _hangs_on(calibration, _influence(calibration, steps, jacobian), jacobian)
     return calibration.with_problems(*hangs)
+
+
+def _linearised(calibration: Calibration) -> tuple[Matrix, Floats, Matrix]:
+    """Covariance by the residuals (P, P), steps without each view (V, P), and what the parameters may do (P, Q)."""
+    equations = normal_equations(calibration)
+    if equations.dof <= 0:
+        raise np.linalg.LinAlgError("no more observations than unknowns")
+    factor = factorise(equations)
+    residual = factor.camera_covariance * max(equations.cost / equations.dof, ROUNDING**2)
+    return residual, camera_without_each_view(factor), equations.unknowns.camera
 
 
 def influence(calibration: Calibration) -> tuple[Influence, ...]:
@@ -168,13 +173,13 @@ def _why_unknown(calibration: Calibration, steps: Floats) -> Problem | None:
 
 
 def _influence(calibration: Calibration, steps: Floats, jacobian: Floats) -> tuple[Influence, ...]:
-    lengths = np.linalg.norm(jacobian @ steps.T, axis=1)  # (N, V) px
-    squares = (lengths**2).mean(axis=0)
+    moved = (((jacobian @ step) ** 2).sum(axis=1) for step in steps)  # (N,) px² of one view after the other
+    squares, worst_squares = np.array([(square.mean(), square.max()) for square in moved]).T
     total = squares.sum()
     return tuple(
         Influence(view.image, float(rms), step, float(np.sqrt(square)), float(worst), float(square / (total or 1.0)))
         for view, rms, step, square, worst in zip(
-            calibration.observations.used, calibration.view_rms_px, steps, squares, lengths.max(axis=0), strict=True
+            calibration.observations.used, calibration.view_rms_px, steps, squares, np.sqrt(worst_squares), strict=True
         )
     )
 

@@ -334,7 +334,7 @@ def test_root_solves_whatever_its_size():
         half = rng.normal(size=(size, size))
         matrix = half @ half.T + size * np.eye(size)
         right = rng.normal(size=(size, 3))
-        root = CholeskyRoot.of(matrix)
+        root = CholeskyRoot.of(matrix.copy())
         np.testing.assert_allclose(matrix @ root.solve(right), right, atol=1e-10)
         np.testing.assert_allclose(np.tril(root.lower) @ root.solve_lower(right), right, atol=1e-10)
     with pytest.raises(np.linalg.LinAlgError):
