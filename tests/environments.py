@@ -22,13 +22,13 @@ class Environment:
     def run(self, *arguments: str, code: int = 0) -> subprocess.CompletedProcess[str]:
         kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COV"))}
         command = [self.python, *arguments]  # from its own folder: Python looks for modules where it is started
-        done = subprocess.run(command, capture_output=True, text=True, timeout=250, env=kept, cwd=self.folder)
+        done = subprocess.run(command, capture_output=True, text=True, env=kept, cwd=self.folder)
         assert done.returncode == code, done.stdout + done.stderr
         return done
 
     def pip(self, *arguments: str) -> None:
         command = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check", "--python", self.python]
-        done = subprocess.run([*command, *arguments], capture_output=True, text=True, timeout=250)
+        done = subprocess.run([*command, *arguments], capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
 
     def install(self, package: Path) -> None:

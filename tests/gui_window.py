@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-PATIENCE_S = 120
+PATIENCE_S = 300  # of a machine that is slow, or busy with other things
 SCREENSHOTS = os.environ.get("OPENCSP_CALIB_SCREENSHOTS")
 """A folder to put a picture of every step into."""
 
@@ -39,7 +39,7 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         self.process.terminate()
-        self.more_output, self.errors = self.process.communicate(timeout=30)
+        self.more_output, self.errors = self.process.communicate(timeout=120)
 
 
 class Window:

@@ -9,6 +9,8 @@ from pathlib import Path
 import pytest
 from environments import Environment
 
+pytestmark = pytest.mark.timeout(1200)  # pip starts several times
+
 EXAMPLE = Path(__file__).resolve().parents[1] / "docs" / "example_plugin"
 BROKEN = """
 [build-system]

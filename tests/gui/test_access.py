@@ -8,7 +8,7 @@ from urllib.parse import urlsplit
 import pytest
 from gui_window import Server, Window
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(1200)
 
 
 def answer(server: Server, path: str, method: str = "GET", address: str = "127.0.0.1", **headers: str) -> int:

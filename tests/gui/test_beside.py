@@ -11,7 +11,7 @@ from opencsp_calib import Camera
 from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.images import write_image
 
-pytestmark = pytest.mark.timeout(300)
+pytestmark = pytest.mark.timeout(1200)
 
 
 def test_put_back_is_as_before(calibrated: Window) -> None:

@@ -9,7 +9,7 @@ import pytest
 from gui_window import Window
 
 pytest.importorskip("pypylon", reason="Basler's SDK is not installed")
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 
 COPIES = 6  # frames for which a board is held still
 FRAMES_A_SECOND = 3

@@ -8,7 +8,7 @@ import pytest
 from camera_files import assert_same_files
 from gui_window import Server, Window, run_cli
 
-pytestmark = pytest.mark.timeout(600)
+pytestmark = pytest.mark.timeout(1200)
 STEPS = ("find-corners", "view-corners", "calibrate", "reprojection-error", "visualize-distortion", "save-camera")
 BOARD = "checkerboard:18x23:50mm"
 
