@@ -41,7 +41,7 @@ from opencsp_calib.board import Board, CharucoBoard, Checkerboard, RecordedBoard
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations
-from opencsp_calib.errors import FileFormatError
+from opencsp_calib.errors import FileFormatError, InputError
 from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera, written
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
@@ -159,12 +159,15 @@ def _read_observations(group: "h5py.Group") -> Observations:
     described = _json(group, "views")
     if len(described) != len(counts):
         raise FileFormatError(f"{group.file.filename}: {len(described)} views, but corners of {len(counts)}")
-    views = tuple(
-        view_from_json(entry, {name: arrays[name][index] for name in names}) for index, entry in enumerate(described)
-    )
+    views = []
+    for index, entry in enumerate(described):
+        try:
+            views.append(view_from_json(entry, {name: arrays[name][index] for name in names}))
+        except InputError as error:  # NaN, a corner twice
+            raise FileFormatError(f"{group.file.filename}: view {index + 1} of {len(described)}: {error}") from None
     width, height = (int(side) for side in read_dataset(group, "image_size"))
     board = _board_from_json(_json(group, "board"), _array(group, "board_points", (None, 3)))
-    return Observations(board, (width, height), views)
+    return Observations(board, (width, height), tuple(views))
 
 
 def _charuco_fields(board: Board) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import opencsp_as_described
 import pytest
@@ -110,6 +111,18 @@ def test_a_calibration_comes_back_whole(board: Board, tmp_path: Path) -> None:
         np.testing.assert_array_equal(new.detection.ids, old.detection.ids)
         np.testing.assert_array_equal(new.detection.pixels, old.detection.pixels)
         assert (new.detection.covariance is None) == (old.detection.covariance is None or not len(old.detection))
+
+
+@pytest.mark.parametrize(("name", "value", "what"), [("pixels", np.nan, "NaN"), ("ids", 0, "same corner twice")])
+def test_corners_that_cannot_be_are_refused_by_name(name: str, value: float, what: str, tmp_path: Path) -> None:
+    """By a file that somebody else made: ours does not write such."""
+    path = tmp_path / "observed.h5"
+    save_observations(observations(BOARDS[0]), path)
+    with h5py.File(path, "a") as file:
+        dataset = file["Calibration/observations"][name]
+        dataset[0] = dataset[1] if name == "ids" else value
+    with pytest.raises(FileFormatError, match=rf"observed\.h5: view 1 of .*{what}"):
+        load_observations(path)
 
 
 def test_observations_alone_come_back_and_have_no_camera(tmp_path: Path) -> None:
