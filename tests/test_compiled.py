@@ -30,7 +30,6 @@ def test_a_read_only_installation_without_a_home_keeps_its_code_in_a_private_fol
     }
     code = "from opencsp_calib.compiled import corner_fit; corner_fit()"
     environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"} | places
-    environment["NUMBA_OPT"] = "0"  # compiles faster
     kept = []
     for _ in range(2):
         subprocess.run([sys.executable, "-c", code], check=True, env=environment, cwd=tmp_path)
