@@ -131,7 +131,7 @@ def memory(folder: Path) -> None:
     peaks = {}
     for count in (50, 500):
         photographs(folder / f"small{count}", count, SMALL)
-        peaks[count] = Run.of(ours(folder / f"small{count}", "--solver", "opencv")).peak_mb
+        peaks[count] = Run.of(ours(folder / f"small{count}")).peak_mb
         print(f"{count} images of 640x480: {peaks[count]:.0f} MB at most", flush=True)
     corners = 450 * 21 * 18 * (2 + 4 + 2 + 2) * 8 / 2**20  # pixels, covariance, edge width and contrast, residuals
     print(f"450 images more take {peaks[500] - peaks[50]:.0f} MB more; their corners alone are {corners:.0f} MB")
