@@ -44,7 +44,12 @@ PARTS = (
     Part("models", ("models/*.py",), ("test_models", "test_camera")),
     Part(
         "corners",
-        ("corner*.py", "corner_kernel/*.py"),
+        # not corner_table.py, which is the solvers'
+        (
+            "corners.py",
+            *(f"corner_{what}.py" for what in ("fit", "grid", "judgement", "windows")),
+            "corner_kernel/*.py",
+        ),
         ("test_corner_grid", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
     ),
     Part("hdf5", ("hdf5*.py",), ("test_hdf5", "test_hdf5_damage")),
