@@ -100,14 +100,19 @@ class Window:
         field.send_keys(text)
 
     def click(self, testid: str) -> None:
-        self.until(lambda: self.element(testid).is_enabled())
-        self.element(testid).click()
+        self.until(lambda: self._pressed(self.element(testid)))
 
     def press(self, words: str) -> None:
         """Click the button with these words on it."""
         button = f"//button[normalize-space()='{words}']"
-        self.until(lambda: self.browser.find_element("xpath", button).is_enabled())
-        self.browser.find_element("xpath", button).click()
+        self.until(lambda: self._pressed(self.browser.find_element("xpath", button)))
+
+    def _pressed(self, button: Any) -> bool:
+        """Press it, if it can be pressed."""
+        if not button.is_enabled():
+            return False
+        button.click()
+        return True
 
     def find_all(self, selector: str) -> list[Any]:
         return list(self.browser.find_elements("css selector", selector))
@@ -115,13 +120,20 @@ class Window:
     def text_is_there(self, text: str) -> bool:
         return text in str(self.browser.find_element("tag name", "body").text)
 
-    def row(self, testid: str, index: int) -> Any:
-        return self.find_all(f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr")[index]
+    def tick(self, testid: str, index: int) -> None:
+        """Press the checkbox of a row."""
+        rows = f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr"
+        self.until(lambda: self._pressed(self.find_all(rows)[index].find_element("css selector", ".q-checkbox")))
 
     def rows(self, testid: str) -> list[list[str]]:
         """The words in a table, but for the cells of its checkboxes; long tables have fillers for rows out of sight."""
-        rows = self.find_all(f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr")
-        return [[cell.text for cell in row.find_elements("css selector", "td")[1:]] for row in rows]
+        # read in one go: the table may be made anew between two questions
+        script = (
+            "return [...document.querySelectorAll(arguments[0])].map("
+            "row => [...row.querySelectorAll('td')].slice(1).map(cell => cell.innerText.trim()))"
+        )
+        rows = f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr"
+        return [list(map(str, row)) for row in self.browser.execute_script(script, rows)]
 
     def tab(self, name: str) -> None:
         """Bring a tab to the front."""

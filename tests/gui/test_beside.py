@@ -16,14 +16,14 @@ pytestmark = pytest.mark.timeout(1200)
 
 def test_put_back_is_as_before(calibrated: Window) -> None:
     rms = calibrated.rms
-    calibrated.row("worst-images", 1).find_element("css selector", ".q-checkbox").click()
+    calibrated.tick("worst-images", 1)
     calibrated.press("Remove and recalibrate")
     calibrated.until(lambda: "from 11 views" in calibrated.status)
     calibrated.until(lambda: calibrated.text_is_there("moved by"))
     calibrated.tab("Photographs")
     calibrated.until(lambda: [row for row in calibrated.rows("images") if row[2] == "left out"])
     out = next(index for index, row in enumerate(calibrated.rows("images")) if row[2] == "left out")
-    calibrated.row("images", out).find_element("css selector", ".q-checkbox").click()
+    calibrated.tick("images", out)
     calibrated.press("Put back")
     calibrated.until(lambda: "from 12 views" in calibrated.status)
     assert calibrated.rms == rms

@@ -23,6 +23,8 @@ def test_wrong_images_say_why(window: Window, photographs: Path, tmp_path: Path)
     window.until(lambda: window.enabled("find-corners"))
     window.find_corners()
     assert window.status == "The board is found in 4 of 8 photographs."
+    # the table follows the status within half a second
+    window.until(lambda: [row[2] for row in window.rows("images")].count("used") == 4)
     table = {row[1]: row for row in window.rows("images")}
     assert table["notes.txt"][2] == table["empty.png"][2] == "unreadable"
     assert "empty" in table["empty.png"][-1]
@@ -112,7 +114,7 @@ def test_tomorrow_it_goes_on_from_here(
         assert window.rms == f"{rms:.4f} px"
         assert [window.element(name).get_attribute("value") for name in ("grid-x", "grid-y")] == ["9", "6"]
         assert window.enabled("calibrate")
-        assert len(window.rows("images")) == 12
+        window.until(lambda: len(window.rows("images")) == 12)
         window.tab("Capture")  # here without Basler's SDK
         window.until(lambda: "pip install 'opencsp-calib[basler]'" in window.element("capture-lacking").text)
         assert not window.enabled("capture-start")

@@ -57,7 +57,7 @@ def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> 
     rows = window.rows("worst-images")
     assert len(rows) == 5
     worst = rows[0][0]
-    window.row("worst-images", 0).find_element("css selector", ".q-checkbox").click()
+    window.tick("worst-images", 0)
     window.press("Remove and recalibrate")
     window.until(lambda: window.status.startswith("Calibrated from 9 views"))
     window.until(lambda: window.text_is_there("1 dropped"))
