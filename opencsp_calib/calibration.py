@@ -1,9 +1,9 @@
 """The result: a camera, and everything that says how far to trust it."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -15,7 +15,10 @@ from opencsp_calib.errors import InputError
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 
-__all__ = ["Calibration"]
+__all__ = ["LEAST_VIEWS", "Calibration", "Solve"]
+
+LEAST_VIEWS = 3
+"""Below these nobody calibrates: two views may do in theory, and nothing tells how wrong they are."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +120,9 @@ class Calibration:
             self.camera.project(pose.transform(self.board.points[d.ids])) - d.pixels
             for pose, d in zip(self.cam_from_board, self.observations.detections, strict=True)
         )
+
+
+Solve: TypeAlias = Callable[[Observations], Calibration]
 
 
 def _rms(residuals: Floats) -> float:

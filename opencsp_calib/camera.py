@@ -149,8 +149,8 @@ class Camera:
         return replace(self, params=self.params - offset, image_size=(width, height))
 
     def undistort(self, image: NDArray[Any], target: "Camera | None" = None) -> NDArray[Any]:
-        """An image as a pinhole camera would have taken it; see `opencsp_calib.images.undistort`."""
-        from opencsp_calib.images import undistort
+        """An image as a pinhole camera would have taken it; see `opencsp_calib.undistortion`."""
+        from opencsp_calib.undistortion import undistort
 
         return undistort(image, self, target)
 

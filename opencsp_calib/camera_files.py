@@ -1,6 +1,6 @@
-"""Camera files of any format, as people handle them: open, convert exactly or by a fit, write, undistort with one."""
+"""Camera files of any format, as people handle them: open, convert exactly or by a fit, write."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -12,22 +12,18 @@ from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
 from opencsp_calib.hdf5 import load_record
 from opencsp_calib.hdf5_calibration import load_calibration
-from opencsp_calib.images import ImageFile, read_image, write_image
 from opencsp_calib.importing import exact, fitted, pick, read_cameras
 from opencsp_calib.interfaces import Imported, KeepsNotes
 from opencsp_calib.lens_fit import LensFit
-from opencsp_calib.models import lens_model
 from opencsp_calib.registry import installed
+from opencsp_calib.typed import image_size_from
 
 __all__ = [
     "CameraFile",
     "Converted",
     "calibration_in",
     "convert",
-    "image_size_from",
     "read_camera_file",
-    "typed_camera",
-    "undistort_images",
     "write_camera_file",
 ]
 
@@ -164,42 +160,6 @@ def _naming(path: str | PathLike[str]) -> Iterator[None]:
         raise type(error)(f"{path}: {error}") from None
 
 
-def image_size_from(text: str | None) -> tuple[int, int] | None:
-    """The width and height in WIDTHxHEIGHT.
-
-    Raises
-    ------
-    InputError
-        If it is written otherwise.
-    """
-    if text is None:
-        return None
-    width, x, height = text.lower().partition("x")
-    if not (x and width.isdecimal() and height.isdecimal()):
-        raise InputError(f"an image size is written as WIDTHxHEIGHT, such as 1626x1236, not {text!r}")
-    return int(width), int(height)
-
-
-def typed_camera(params: str, model: str | None, image_size: str | None, name: str) -> Camera:
-    """A camera typed by hand: ``fx=..,fy=..,...`` for a lens model and an image size.
-
-    Raises
-    ------
-    InputError
-        If one of them is missing, or is none of the model's.
-    """
-    size = image_size_from(image_size)
-    if model is None or size is None:
-        raise InputError("--params needs --model and --image-size too")
-    names = lens_model(model).parameter_names
-    values = dict(_typed_number(pair) for pair in params.split(","))
-    missing, unknown = [n for n in names if n not in values], [n for n in values if n not in names]
-    if missing or unknown:
-        what = f"lacks {', '.join(missing)}" if missing else f"has {', '.join(unknown)}, which it should not"
-        raise InputError(f"--params {what}; {model} has {', '.join(names)}")
-    return Camera(name, model, [values[n] for n in names], size)  # type: ignore[arg-type]  # made an array there
-
-
 def write_camera_file(
     camera: Camera, path: Path, format_name: str | None = None, record: Mapping[str, str] | None = None
 ) -> str:
@@ -232,46 +192,6 @@ def write_camera_file(
         return ""
     writer.write({camera.name: camera}, path)
     return f"{writer.title} has no room for notes; keep them yourself" if record else ""
-
-
-def undistort_images(
-    camera: Camera, files: tuple[ImageFile, ...], folder: Path, progress: Callable[[int, int], None] | None = None
-) -> None:
-    """Write images without their lens distortion into another folder, as PNG.
-
-    Parameters
-    ----------
-    camera : Camera
-    files : tuple of ImageFile
-    folder : Path
-        Made if it does not exist.
-    progress : callable, optional
-        Told how many are done, and how many there are, after each.
-
-    Raises
-    ------
-    InputError
-        If the folder is a file, or holds the images themselves; or one cannot be read, or has another size.
-    """
-    if folder.exists() and not folder.is_dir():
-        raise InputError(f"{folder} is a file; give a folder")
-    if folder.absolute() in {file.path.absolute().parent for file in files}:
-        raise InputError(f"{folder} holds the photographs themselves; give another folder")
-    folder.mkdir(parents=True, exist_ok=True)
-    for done, file in enumerate(files, start=1):
-        target = folder / Path(file.name).with_suffix(".png")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        write_image(camera.undistort(read_image(file).pixels), target)
-        if progress:
-            progress(done, len(files))
-
-
-def _typed_number(pair: str) -> tuple[str, float]:
-    name, _, value = pair.partition("=")
-    try:
-        return name.strip(), float(value)
-    except ValueError:
-        raise InputError(f"--params takes NAME=NUMBER, such as fx=2710.0, not {pair.strip()!r}") from None
 
 
 def _noted(notes: tuple[Problem, ...]) -> dict[str, str]:

@@ -17,14 +17,13 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.board import Board
-from opencsp_calib.calibration import Calibration
+from opencsp_calib.calibration import Calibration, Solve
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.pose_fit import pose_residuals
 from opencsp_calib.projection_sigma import camera_sigma_map, sigma_map
-from opencsp_calib.resampling import Solve
 from opencsp_calib.uncertainty import student_factor, with_uncertainty
 
 __all__ = ["Check", "Judged", "Verdict", "check", "judged", "worse"]

@@ -10,7 +10,7 @@ from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.normal_equations import NormalEquations, normal_equations
 from opencsp_calib.schur import Factorisation, factorise
 
-__all__ = ["judged", "remaining_sigmas"]
+__all__ = ["CONVERGED_SIGMAS", "LEAST_SIGMA_PX", "OPEN_CENTRE", "OPEN_FOCAL", "judged", "remaining_sigmas"]
 
 CONVERGED_SIGMAS = 0.1  # pixels rounded to single precision, which OpenCV takes, leave some 0.01
 SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this

@@ -1,18 +1,14 @@
 """Leaving bad images out: by name, the worst few, or all above an rms; then solving again."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 import numpy as np
 
-from opencsp_calib.calibration import Calibration
+from opencsp_calib.calibration import LEAST_VIEWS, Calibration, Solve
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import InputError
 
-__all__ = ["MIN_LEFT", "drop_above", "drop_worst", "excluding"]
-
-MIN_LEFT = 3  # a calibration cannot do with fewer views
-
-Solve = Callable[[Observations], Calibration]
+__all__ = ["drop_above", "drop_worst", "excluding"]
 
 
 def excluding(observations: Observations, names: Iterable[str]) -> Observations:
@@ -37,11 +33,11 @@ def drop_worst(calibration: Calibration, count: int, solve: Solve) -> Calibratio
     Raises
     ------
     InputError
-        If fewer than `MIN_LEFT` views would be left.
+        If fewer than `LEAST_VIEWS` views would be left.
     """
     used = calibration.observations.used
-    if count < 0 or len(used) - count < MIN_LEFT:
-        raise InputError(f"cannot drop {count} of {len(used)} views: at least {MIN_LEFT} must be left")
+    if count < 0 or len(used) - count < LEAST_VIEWS:
+        raise InputError(f"cannot drop {count} of {len(used)} views: at least {LEAST_VIEWS} must be left")
     worst = np.argsort(-calibration.view_rms_px)[:count]
     return _without(calibration, [used[index].image for index in worst], solve)
 
@@ -52,16 +48,16 @@ def drop_above(calibration: Calibration, limit_px: float, solve: Solve) -> Calib
     Raises
     ------
     InputError
-        If fewer than `MIN_LEFT` views would be left.
+        If fewer than `LEAST_VIEWS` views would be left.
     """
     while True:
         used = calibration.observations.used
         above = [view.image for view, rms in zip(used, calibration.view_rms_px, strict=True) if rms > limit_px]
         if not above:
             return calibration
-        if len(used) - len(above) < MIN_LEFT:
+        if len(used) - len(above) < LEAST_VIEWS:
             raise InputError(
-                f"{len(above)} of {len(used)} views have an rms above {limit_px:g} px; at least {MIN_LEFT} must "
+                f"{len(above)} of {len(used)} views have an rms above {limit_px:g} px; at least {LEAST_VIEWS} must "
                 "be left: take better photographs, or raise the limit"
             )
         calibration = _without(calibration, above, solve)

@@ -41,7 +41,7 @@ class Change:
     Parameters
     ----------
     level : 'unchanged', 'doubtful' or 'changed'
-        Within two sigmas; beyond five, or by more than a pixel; between.
+        Within two sigmas; between; beyond five, or by more than a pixel.
     sentence : str
     rms_px, worst_px : float, optional
         Over the image; None where the two cannot be compared.

@@ -23,6 +23,7 @@ from typing import Any, TypeAlias
 
 import yaml
 
+from opencsp_calib.calibration import LEAST_VIEWS
 from opencsp_calib.errors import FileFormatError, InputError
 from opencsp_calib.images import images_in, natural_order
 
@@ -89,7 +90,7 @@ SETTINGS: Mapping[str, Setting] = {
     "weights": _one_of("equal", "covariance"),
     "robust": ("yes or no", lambda value: isinstance(value, bool)),
     "exclude": ("a list of images' names", _is_texts),
-    "select": ("a whole number, at least 3", lambda value: type(value) is int and value >= 3),
+    "select": (f"a whole number, at least {LEAST_VIEWS}", lambda value: type(value) is int and value >= LEAST_VIEWS),
     "pixel-pitch": ("a number of micrometres", _is_number),
     "note": ("pairs such as {lens: 25 mm}", _is_notes),
 }

@@ -33,12 +33,14 @@ from opencsp_calib.atomic import check_writable, replacing
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib.seal import check_seal, seal
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = [
+    "EXTENSIONS",
     "FORMAT_VERSION",
     "load_camera",
     "load_record",
@@ -51,8 +53,9 @@ __all__ = [
 ]
 
 FORMAT_VERSION = 1
-MODEL_BY_COEFFICIENTS = {4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
+EXTENSIONS = (".h5", ".hdf5", ".hdf")
 MAX_VALUES = 50_000_000  # in one dataset; more is a damaged or hostile file
+MAX_COEFFICIENTS = 100  # likewise, of a dataset of /Camera
 
 
 def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[str, str] | None = None) -> None:
@@ -233,9 +236,9 @@ def _distortion(group: "h5py.Group", path: str) -> tuple[str, Floats]:
     coefficients = np.atleast_1d(_numbers(group, "distortion_coef", None))
     if model == "pinhole" and not coefficients.any():
         return model, np.empty(0)
-    if coefficients.size not in MODEL_BY_COEFFICIENTS:
+    if not coefficients.size or coefficients.size not in OPENCV_MODELS:
         raise FileFormatError(f"{path} has {coefficients.size} distortion coefficients; OpenCV has 4, 5, 8, 12 or 14")
-    by_size = MODEL_BY_COEFFICIENTS[coefficients.size]
+    by_size = OPENCV_MODELS[coefficients.size]
     if model and model != by_size:
         raise FileFormatError(f"{path} says its model is {model!r}, but has {coefficients.size} coefficients")
     return by_size, coefficients
@@ -244,9 +247,10 @@ def _distortion(group: "h5py.Group", path: str) -> tuple[str, Floats]:
 def _numbers(group: "h5py.Group", name: str, shape: tuple[int, ...] | None) -> Floats:
     """A dataset of numbers, squeezed as OpenCSP does: sizes come as (2, 1), coefficients as (1, 5)."""
     values = np.asarray(read_dataset(group, name)).squeeze()
-    if values.dtype.kind not in "fiu" or (shape is not None and values.shape != shape) or values.ndim > 2:
-        raise FileFormatError(f"{group.file.filename}: /Camera/{name} is not an array of numbers of shape {shape}")
-    if values.size > 100 or not np.isfinite(values).all():
+    if values.dtype.kind not in "fiu" or values.size > MAX_COEFFICIENTS or shape not in (None, values.shape):
+        wanted = "" if shape is None else f" of shape {shape}"
+        raise FileFormatError(f"{group.file.filename}: /Camera/{name} is not an array of numbers{wanted}")
+    if not np.isfinite(values).all():
         raise FileFormatError(f"{group.file.filename}: /Camera/{name} has values that are not finite numbers")
     return values.astype(np.float64)
 

@@ -45,7 +45,7 @@ from opencsp_calib.errors import FileFormatError, InputError
 from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera, written
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
-from opencsp_calib.view_json import OPTIONAL, problems_as_json, problems_from_json, view_as_json, view_from_json
+from opencsp_calib.view_json import OPTIONAL, restored_problems, restored_view, stored_problems, stored_view
 
 if TYPE_CHECKING:
     import h5py
@@ -73,7 +73,7 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         group["covariance_residual"] = calibration.covariance_residual
         group["solver"] = calibration.solver
         group["options"] = json.dumps(_options_as_json(calibration.options))
-        group["problems"] = json.dumps(problems_as_json(calibration.problems))
+        group["problems"] = json.dumps(stored_problems(calibration.problems))
         group["record"] = json.dumps(dict(calibration.record))
         group["provenance"] = json.dumps(dict(calibration.provenance))
 
@@ -104,7 +104,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
             outliers=tuple(np.split(_array(group, "outliers", (None,)).astype(bool), ends)),
             covariance=read_dataset(group, "covariance"),
             covariance_residual=read_dataset(group, "covariance_residual"),
-            problems=problems_from_json(_json(group, "problems")),
+            problems=restored_problems(_json(group, "problems")),
             record={str(key): str(value) for key, value in _json(group, "record").items()},
             provenance=_json(group, "provenance"),
         )
@@ -138,7 +138,7 @@ def _write_observations(observations: Observations, group: "h5py.Group") -> None
         | _charuco_fields(board)
     )
     group["board_points"] = board.points
-    group["views"] = json.dumps([view_as_json(view) for view in views])
+    group["views"] = json.dumps([stored_view(view) for view in views])
     group["corners"] = np.array([len(view.detection) for view in views], dtype=np.int32)
     group["ids"] = np.concatenate([np.empty(0, dtype=np.int64), *(view.detection.ids for view in views)])
     group["pixels"] = np.concatenate([np.empty((0, 2)), *(view.detection.pixels for view in views)])
@@ -162,7 +162,7 @@ def _read_observations(group: "h5py.Group") -> Observations:
     views = []
     for index, entry in enumerate(described):
         try:
-            views.append(view_from_json(entry, {name: arrays[name][index] for name in names}))
+            views.append(restored_view(entry, {name: arrays[name][index] for name in names}))
         except InputError as error:  # NaN, a corner twice
             raise FileFormatError(f"{group.file.filename}: view {index + 1} of {len(described)}: {error}") from None
     width, height = (int(side) for side in read_dataset(group, "image_size"))

@@ -1,7 +1,7 @@
 """Image files: which there are, and their grey levels exactly as the sensor gave them.
 
-With `opencsp_calib.opencv` and `opencsp_calib.subpix` the only place in the core that touches OpenCV, and only inside
-functions.
+With `opencsp_calib.subpix` and `opencsp_calib.undistortion` the only place in the core that calls OpenCV, which
+`opencsp_calib.opencv` gives.
 """
 
 import glob
@@ -12,7 +12,7 @@ import stat
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,9 +22,6 @@ from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 from opencsp_calib.image_bytes import fault
 from opencsp_calib.opencv import opencv
-
-if TYPE_CHECKING:
-    from opencsp_calib.camera import Camera
 
 __all__ = [
     "EXTENSIONS",
@@ -40,7 +37,6 @@ __all__ = [
     "read_encoded",
     "read_image",
     "reduced",
-    "undistort",
     "write_image",
 ]
 
@@ -244,40 +240,3 @@ def encode_thumbnail(pixels: NDArray[Any], side: int) -> bytes:
     if small.dtype == np.uint16:
         small = (small / (max(int(small.max()), 1) / 255.0)).astype(np.uint8)
     return bytes(cv2.imencode(".jpg", small, [cv2.IMWRITE_JPEG_QUALITY, 80])[1].tobytes())
-
-
-def undistort(image: NDArray[Any], camera: "Camera", target: "Camera | None" = None) -> NDArray[Any]:
-    """An image as a camera without distortion would have taken it.
-
-    Parameters
-    ----------
-    image : (height, width) or (height, width, channels)
-        Of the camera's image size.
-    camera : Camera
-        That took it.
-    target : Camera, optional
-        That should have taken it; by default a pinhole with the same focal lengths, principal point and size.
-
-    Returns
-    -------
-    array of the same type
-        Interpolated linearly; 0 where nothing was photographed.
-
-    Raises
-    ------
-    InputError
-        If the image has another size than the camera's.
-    """
-    from opencsp_calib.camera import Camera
-
-    cv2 = opencv()
-    height, width = image.shape[:2]
-    if (width, height) != camera.image_size:
-        size = "x".join(map(str, camera.image_size))
-        raise InputError(f"the image is {width}x{height}, but the camera {camera.name!r} is for {size}")
-    target = target or Camera(camera.name, "pinhole", camera.params[:4], camera.image_size)
-    y, x = np.mgrid[: target.image_size[1], : target.image_size[0]]
-    rays = target.unproject(np.column_stack([x.ravel(), y.ravel()]))
-    source = camera.project(rays).astype(np.float32).reshape(*x.shape, 2)
-    source[np.isnan(source)] = -1e6  # outside, so that it becomes 0
-    return np.asarray(cv2.remap(image, source[..., 0], source[..., 1], cv2.INTER_LINEAR))

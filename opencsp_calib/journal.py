@@ -32,7 +32,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.looking import Look
-from opencsp_calib.view_json import OPTIONAL, view_as_json, view_from_json
+from opencsp_calib.view_json import OPTIONAL, restored_view, stored_view
 
 __all__ = ["Journal", "journal_beside"]
 
@@ -183,7 +183,7 @@ def journal_beside(output: str | os.PathLike[str]) -> Path:
 def _line(look: Look, search: str) -> bytes:
     detection = look.view.detection
     arrays = {name: _packed(getattr(detection, name)) for name in ("ids", "pixels", *OPTIONAL)}
-    content = json.dumps({"size": look.size, "view": view_as_json(look.view), "arrays": arrays})
+    content = json.dumps({"size": look.size, "view": stored_view(look.view), "arrays": arrays})
     rest = f"{len(content)} {search} {look.view.sha256} {content}".encode()
     return b"\n" + hashlib.sha256(rest).hexdigest().encode() + b" " + rest + b"\n"
 
@@ -205,7 +205,7 @@ def _look(line: bytes) -> Look | None:
     try:
         _, image = _heading(line)
         entry = json.loads(line.split(b" ", 4)[4])
-        view = view_from_json(entry["view"], _arrays(entry["arrays"]))
+        view = restored_view(entry["view"], _arrays(entry["arrays"]))
         width, height = entry["size"]
         return Look(view, (int(width), int(height))) if image == view.sha256 else None
     except (CalibError, ValueError, TypeError, KeyError, IndexError, RecursionError):

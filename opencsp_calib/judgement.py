@@ -19,9 +19,7 @@ __all__ = ["REMARKS", "Verdict", "conclusion", "fold_inside", "judge", "verdict"
 
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
-PARALLEL_DEG = (
-    10.0  # parallel planes have one vanishing line between them: two equations for fx, fy, cx, cy (Zhang 2000)
-)
+PARALLEL_DEG = 10.0  # parallel planes share one vanishing line: two equations for fx, fy, cx, cy (Zhang 2000)
 TILT_WANTED_DEG = (30.0, 45.0)
 FEW_VIEWS = 10
 COVERAGE_WANTED = 0.5

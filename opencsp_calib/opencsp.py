@@ -6,7 +6,7 @@ import numpy as np
 
 from opencsp_calib.camera import Camera
 from opencsp_calib.errors import InputError, MissingDependencyError, NotExactError
-from opencsp_calib.hdf5 import MODEL_BY_COEFFICIENTS
+from opencsp_calib.models import OPENCV_MODELS
 
 __all__ = ["from_opencsp", "to_opencsp"]
 
@@ -46,10 +46,10 @@ def from_opencsp(camera: Any) -> Camera:
     """
     matrix = np.asarray(camera.intrinsic_mat, dtype=np.float64)
     distortion = np.asarray(camera.distortion_coef, dtype=np.float64).ravel()
-    if distortion.size not in MODEL_BY_COEFFICIENTS:
+    if distortion.size not in OPENCV_MODELS:
         raise InputError(f"a camera with {distortion.size} distortion coefficients cannot be OpenCV's")
     if matrix[0, 1] != 0:
         raise InputError(f"the camera matrix has skew ({matrix[0, 1]:g}), which no lens model of ours has")
     params = np.concatenate([[matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2]], distortion])
     width, height = np.ravel(camera.image_shape_xy)
-    return Camera(str(camera.name), MODEL_BY_COEFFICIENTS[distortion.size], params, (int(width), int(height)))
+    return Camera(str(camera.name), OPENCV_MODELS[distortion.size], params, (int(width), int(height)))

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias, cast
+from typing import Any, Literal, TypeAlias
 
 from opencsp_calib.camera import Camera
 from opencsp_calib.errors import InputError
 
-__all__ = ["PRESETS", "BoardShape", "PixelAspect", "SolveOptions", "Weights", "aspect_from"]
+__all__ = ["PRESETS", "BoardShape", "PixelAspect", "SolveOptions", "Weights"]
 
 BoardShape: TypeAlias = Literal["flat", "warp", "free"]
 Weights: TypeAlias = Literal["equal", "covariance"]
@@ -69,19 +69,3 @@ class SolveOptions:
             "robust": self.robust,
         }
         return frozenset(ability for ability, is_needed in needed.items() if is_needed)
-
-
-def aspect_from(text: str | None) -> PixelAspect | None:
-    """What a person typed for the pixel aspect: free, square, or a number (fy/fx).
-
-    Raises
-    ------
-    InputError
-        If it is none of them.
-    """
-    if text is None or text in ("free", "square"):
-        return cast("PixelAspect | None", text)
-    try:
-        return float(text)
-    except ValueError:
-        raise InputError(f"the pixel aspect is free, square or a number (fy/fx), not {text!r}") from None

@@ -9,11 +9,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from opencsp_calib import board_shape as shapes
-from opencsp_calib import selecting
+from opencsp_calib import hdf5, selecting
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
-from opencsp_calib.calibration import Calibration
+from opencsp_calib.calibration import LEAST_VIEWS, Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.cluster import Scheduler
 from opencsp_calib.detecting import Progress, Stop, check_board_seen, look_at
@@ -45,7 +45,6 @@ __all__ = [
 
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
-MIN_VIEWS = 3
 OF_DETECT = ("detector", "refine", "jobs", "progress", "stop", "journal", "scheduler")
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -62,7 +61,7 @@ def board_from(text: str) -> Board:
     path = Path(text)
     if path.suffix.lower() == ".json":
         return read_board_file(path, installed().board)
-    if path.suffix.lower() in (".h5", ".hdf5"):
+    if path.suffix.lower() in hdf5.EXTENSIONS:
         return load_calibration(path).board
     return installed().board(text)
 
@@ -279,9 +278,9 @@ def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
 def _check_views(observations: Observations) -> None:
     check_board_seen(observations)
     used, looked_at = len(observations.used), len(observations.views)
-    if used < MIN_VIEWS:
+    if used < LEAST_VIEWS:
         raise InputError(
-            f"only {used} of {looked_at} images can be used; a calibration needs at least {MIN_VIEWS} views, "
+            f"only {used} of {looked_at} images can be used; a calibration needs at least {LEAST_VIEWS} views, "
             "better about 50"
         )
     # the same pose again adds no information: a solver would fail, or worse, not fail

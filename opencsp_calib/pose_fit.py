@@ -21,17 +21,16 @@ from opencsp_calib.initial import initial_poses
 from opencsp_calib.pose import Pose
 from opencsp_calib.rotations import rotation_matrices
 
-__all__ = ["fit_pose", "pose_residuals"]
+__all__ = ["MIN_CORNERS", "fit_pose", "on_one_line", "pose_residuals"]
 
 MIN_CORNERS = 4
-ON_A_LINE = 1e-6  # width of a set of corners, in parts of its length, below which a pose cannot be told
+"""Of one view, and not on one line: fewer do not tell where a board is."""
+ON_A_LINE = 1e-6  # width of a set of corners, in parts of its length
 CLEAR = 30.0  # times the residuals: perspective that shows by more cannot be mistaken
 TILT = 0.7  # rad, of the starts tried where it is not clear: between head-on and grazing
 MAX_STEPS = 100
 MAX_DAMPING = 1e8
-SMALL_GAIN = (
-    1e-12  # of the cost: where the next step promises less, it has converged, to 1e-6 of what noise leaves open
-)
+SMALL_GAIN = 1e-12  # of the cost: where a step promises less, it has converged, to 1e-6 of what noise leaves open
 EXACT_PX = 1e-10  # residuals below this are rounding
 
 
@@ -60,10 +59,9 @@ def fit_pose(camera: Camera, board: Board, detection: Detection) -> Pose:
         If no pose was found that puts the corners before the camera.
     """
     points = board.points[detection.ids]
-    middle = points.mean(axis=0) if len(points) else np.zeros(3)
-    extent = np.linalg.svd(points - middle, compute_uv=False)
-    if len(points) < MIN_CORNERS or extent[1] < ON_A_LINE * extent[0]:
+    if len(points) < MIN_CORNERS or on_one_line(points):
         raise InputError(f"{len(points)} corners, or all on one line, do not tell where the board is")
+    middle = points.mean(axis=0)
     view = Observations(board, camera.image_size, (View("", detection, "used"),))
     (start,) = initial_poses(camera, view)
     at = start.transform(middle[None])[0]
@@ -90,6 +88,12 @@ def pose_residuals(camera: Camera, board: Board, detection: Detection) -> Pixels
     """
     pose = fit_pose(camera, board, detection)
     return camera.project(pose.transform(board.points[detection.ids])) - detection.pixels
+
+
+def on_one_line(points: Points) -> bool:
+    """Whether points (n, 3), two or more, all lie on one line."""
+    length, width, _ = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(width <= ON_A_LINE * length)
 
 
 def _mirrored(rotation: Matrix, at: Vector) -> Matrix:

@@ -53,6 +53,10 @@ class Registry:
         """The camera format of that name, able to run; PluginError or MissingDependencyError otherwise."""
         return usable(self.camera_formats, name, "camera format")
 
+    def board_kind(self, name: str) -> BoardKind:
+        """The kind of board of that name, able to run; PluginError or MissingDependencyError otherwise."""
+        return usable(self.boards, name, "kind of board")
+
     def board(self, spec: str) -> Board:
         """The board of a one-line description; raises BoardSpecError."""
         kind = spec.partition(":")[0]

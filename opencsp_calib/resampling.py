@@ -3,14 +3,12 @@
 Everything here takes `solve` as an argument: any function of observations that returns a calibration.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import TypeAlias
 
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
-from opencsp_calib.calibration import Calibration
+from opencsp_calib.calibration import Calibration, Solve
 from opencsp_calib.comparison import Difference, compare
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibrationFailedError, InputError
@@ -21,7 +19,6 @@ from opencsp_calib.schur import factorise
 __all__ = [
     "HalvesDifference",
     "HeldOut",
-    "Solve",
     "compare_halves",
     "folds",
     "half_steps",
@@ -33,7 +30,6 @@ __all__ = [
 ]
 
 HALVES = slice(0, None, 2), slice(1, None, 2)
-Solve: TypeAlias = Callable[[Observations], Calibration]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
-from opencsp_calib.calibration import Calibration
+from opencsp_calib.calibration import LEAST_VIEWS, Calibration, Solve
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Detection, Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
@@ -22,14 +22,11 @@ from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.pose_fit import fit_pose
 
-__all__ = ["MIN_SELECTED", "Selection", "select"]
+__all__ = ["Selection", "select"]
 
-MIN_SELECTED = 3  # a calibration cannot do with fewer
 FIRST_VIEWS = 30  # for the first camera: enough for any lens model, and quick
 SAME_PLACE = 0.02  # of the image's width: corners that moved less on average are seen from the same place
 MISFIT = 5.0  # times the median view's rms: such a view's information is a false one
-
-Solve = Callable[[Observations], Calibration]
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,12 +73,12 @@ def select(
     Raises
     ------
     InputError
-        If fewer than `MIN_SELECTED` are asked for.
+        If fewer than `LEAST_VIEWS` are asked for.
     CalibrationFailedError
         If no first camera comes out.
     """
-    if count < MIN_SELECTED:
-        raise InputError(f"cannot select {count} views: a calibration needs at least {MIN_SELECTED}")
+    if count < LEAST_VIEWS:
+        raise InputError(f"cannot select {count} views: a calibration needs at least {LEAST_VIEWS}")
     used = observations.used
     if len(used) <= count:
         return Selection(observations, len(used), 1.0)

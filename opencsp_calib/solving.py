@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats, Mask, Params, Points
+from opencsp_calib.arrays import Floats, Mask, Params
 from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
@@ -14,8 +14,9 @@ from opencsp_calib.interfaces import Solver
 from opencsp_calib.models import lens_model
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
+from opencsp_calib.pose_fit import MIN_CORNERS, on_one_line
 
-__all__ = ["ABILITIES", "check_request", "finished"]
+__all__ = ["ABILITIES", "MIN_CORNERS", "check_request", "finished"]
 
 ABILITIES = {
     "guess": "start from a guess",
@@ -26,7 +27,6 @@ ABILITIES = {
     "robust": "leave out outlying corners",
 }
 MIN_VIEWS = 2  # of a flat board; one view of a plane does not determine a camera
-MIN_CORNERS = 4  # of one view, not on one line
 SHORTEST_FOCAL = 0.05  # of the image's longer side: a fisheye that sees all around has 0.16
 
 
@@ -59,7 +59,7 @@ def check_request(solver: Solver, observations: Observations, model: str, option
         raise InputError(f"{len(used)} usable view(s): at least {MIN_VIEWS} are needed, and 10 or more are wise")
     for view in used:
         ids = view.detection.ids
-        if len(ids) < MIN_CORNERS or _on_one_line(observations.board.points[ids]):
+        if len(ids) < MIN_CORNERS or on_one_line(observations.board.points[ids]):
             raise InputError(
                 f"{view.image} has {len(ids)} corners; a view needs {MIN_CORNERS}, not all on one line; drop it"
             )
@@ -139,8 +139,3 @@ def finished(
                 f"or where {model!r} folds back; {advice}"
             )
     return calibration
-
-
-def _on_one_line(points: Points) -> bool:
-    spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    return bool(spread[1] <= 1e-6 * spread[0])

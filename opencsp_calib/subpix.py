@@ -10,6 +10,7 @@ import numpy as np
 from opencsp_calib.arrays import Floats, Pixels
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
+from opencsp_calib.opencv import opencv
 
 __all__ = ["refine_subpix"]
 
@@ -35,10 +36,9 @@ def refine_subpix(image: Image, detection: Detection) -> Detection:
     Detection
         Without covariance: this way gives none. A corner that cannot be searched for stays where it was.
     """
-    import cv2
-
     if len(detection) == 0:
         return detection
+    cv2 = opencv()
     grey = image.pixels.astype(np.float32)
     pixels = detection.pixels.astype(np.float32)
     until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, STEPS, STEP_PX)

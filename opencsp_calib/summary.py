@@ -7,7 +7,6 @@ from typing import Any
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations, Problem, View
-from opencsp_calib.errors import InputError
 from opencsp_calib.judgement import judge
 from opencsp_calib.quality import ViewQuality, view_qualities
 
@@ -15,7 +14,6 @@ __all__ = [
     "PIXEL_PITCH",
     "calibration_as_json",
     "camera_as_json",
-    "notes_from",
     "observations_as_json",
     "parameter_lines",
     "problems_as_json",
@@ -24,23 +22,6 @@ __all__ = [
 
 PIXEL_PITCH = "pixel_pitch_um"
 """The key in a camera's record that tells the size of its pixels in micrometres."""
-
-
-def notes_from(pairs: Iterable[str]) -> dict[str, str]:
-    """A camera's record from what a person typed: KEY=VALUE each.
-
-    Raises
-    ------
-    InputError
-        If one is not.
-    """
-    notes = {}
-    for pair in pairs:
-        key, equals, value = pair.partition("=")
-        if not (equals and key.strip()):
-            raise InputError(f"a note is written as KEY=VALUE, such as aperture=f/8, not {pair!r}")
-        notes[key.strip()] = value.strip()
-    return notes
 
 
 def camera_as_json(camera: Camera, sigma: Iterable[float] | None = None) -> dict[str, Any]:

@@ -9,26 +9,26 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.detection import Detection, Problem, RejectedCorner, Status, View
 from opencsp_calib.errors import FileFormatError
 
-__all__ = ["OPTIONAL", "problems_as_json", "problems_from_json", "view_as_json", "view_from_json"]
+__all__ = ["OPTIONAL", "restored_problems", "restored_view", "stored_problems", "stored_view"]
 
 OPTIONAL = {"covariance": (2, 2), "edge_width_px": (), "contrast": ()}
 """What a detection may or may not know of its corners, with its shape for one corner."""
 
 
-def view_as_json(view: View) -> dict[str, Any]:
+def stored_view(view: View) -> dict[str, Any]:
     """Everything of a view but the arrays of its detection."""
     rejected = [[corner.id, *corner.pixel, corner.reason] for corner in view.detection.rejected]
     return {
         "image": view.image,
         "sha256": view.sha256,
         "status": view.status,
-        "problems": problems_as_json(view.problems),
+        "problems": stored_problems(view.problems),
         "reason": view.detection.reason,
         "rejected": rejected,
     }
 
 
-def view_from_json(entry: Mapping[str, Any], arrays: Mapping[str, Floats | None]) -> View:
+def restored_view(entry: Mapping[str, Any], arrays: Mapping[str, Floats | None]) -> View:
     """The view again, with the arrays of its detection: ``ids``, ``pixels`` and those of `OPTIONAL`.
 
     Raises
@@ -47,15 +47,15 @@ def view_from_json(entry: Mapping[str, Any], arrays: Mapping[str, Floats | None]
         rejected=rejected,
         reason=str(entry["reason"]),
     )
-    problems = problems_from_json(entry["problems"])
+    problems = restored_problems(entry["problems"])
     return View(str(entry["image"]), detection, entry["status"], problems, str(entry["sha256"]))
 
 
-def problems_as_json(problems: Iterable[Problem]) -> list[list[str]]:
+def stored_problems(problems: Iterable[Problem]) -> list[list[str]]:
     """Codes and messages."""
     return [[problem.code, problem.message] for problem in problems]
 
 
-def problems_from_json(entries: list[list[str]]) -> tuple[Problem, ...]:
+def restored_problems(entries: list[list[str]]) -> tuple[Problem, ...]:
     """The problems again."""
     return tuple(Problem(str(code), str(message)) for code, message in entries)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opencsp_calib import Camera, InputError, Pose
-from opencsp_calib.images import undistort
+from opencsp_calib.undistortion import undistort
 
 CAMERA = Camera("lab", "opencv4", [1400.0, 1410.0, 803.0, 611.0, -0.2, 0.1, 1e-3, -2e-3], (1626, 1236))
 RAYS = CAMERA.unproject(np.random.default_rng(0).uniform(0, 1200, (50, 2)))

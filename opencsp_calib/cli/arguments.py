@@ -1,16 +1,10 @@
 """The arguments that several commands share."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from opencsp_calib.errors import FileFormatError, InputError, MissingDependencyError
-
-if TYPE_CHECKING:
-    from opencsp_calib.camera import Camera
-
-SOLVING = "Solving"
 OUTPUT = "Output"
 
 Images = Annotated[list[str], typer.Argument(metavar="IMAGES", help="Image files, folders, or glob patterns.")]
@@ -52,66 +46,6 @@ RefineBy = Annotated[
     Literal["none", "subpix", "model"] | None,
     typer.Option(help="How corners are located: as found, by OpenCV's search, or by fitting the image of a corner."),
 ]
-Model = Annotated[
-    str | None, typer.Option(metavar="MODEL", help="The lens model.", show_default="opencv4", rich_help_panel=SOLVING)
-]
-SolverName = Annotated[
-    str | None,
-    typer.Option(
-        "--solver",
-        metavar="NAME",
-        help="Which solver finds the camera; `plugins` lists them.",
-        show_default="bundle",
-        rich_help_panel=SOLVING,
-    ),
-]
-BoardShapeOption = Annotated[
-    Literal["flat", "warp", "free", "auto"] | None,
-    typer.Option(
-        "--board-shape",
-        help="Take the board as flat, with a smooth warp, or solve for every corner; auto decides from the data.",
-        show_default="auto",
-        rich_help_panel=SOLVING,
-    ),
-]
-PixelAspectOption = Annotated[
-    str | None,
-    typer.Option(
-        "--pixel-aspect",
-        metavar="free|square|RATIO",
-        help="Whether fx and fy are independent, equal, or in the ratio fy/fx.",
-        show_default="free",
-        rich_help_panel=SOLVING,
-    ),
-]
-WeightsOption = Annotated[
-    Literal["equal", "covariance"] | None,
-    typer.Option("--weights", help="By default covariance for bundle, else equal.", rich_help_panel=SOLVING),
-]
-RobustOption = Annotated[
-    bool | None,
-    typer.Option(
-        "--robust/--no-robust", help="Leave out outlying corners; default for bundle.", rich_help_panel=SOLVING
-    ),
-]
-GuessOption = Annotated[
-    Path | None,
-    typer.Option("--guess", metavar="CAMERA", help="A camera file to start from.", rich_help_panel=SOLVING),
-]
-
-
-def guess_from(path: Path | None) -> "Camera | None":
-    """The camera that ``--guess`` names, in any format we read."""
-    from opencsp_calib.cli.camera_files import camera_in
-
-    if path is None:
-        return None
-    try:
-        return camera_in(path)
-    except (FileFormatError, MissingDependencyError):
-        raise
-    except InputError as error:
-        raise InputError(f"--guess {path}: {error} (with `opencsp-calib convert`, and guess with its output)") from None
 
 
 def given(**options: Any) -> dict[str, Any]:

@@ -9,6 +9,7 @@ import typer
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import print_json, progress_bar, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud, kept_beside
+from opencsp_calib.cli.solving_options import with_solving_options
 from opencsp_calib.cli.targets import check_not_input, check_targets
 from opencsp_calib.errors import InputError
 
@@ -17,19 +18,14 @@ if TYPE_CHECKING:
     from opencsp_calib.detection import Observations
 
 
+@with_solving_options
 def calibrate(
     images: args.Images,
     board: args.BoardSpec,
+    solving: dict[str, Any],
     name: Annotated[str | None, typer.Option(help="The camera's name; by default the folder's.")] = None,
     detector: args.DetectorName = None,
     refine: args.RefineBy = None,
-    model: args.Model = None,
-    solver: args.SolverName = None,
-    board_shape: args.BoardShapeOption = None,
-    pixel_aspect: args.PixelAspectOption = None,
-    weights: args.WeightsOption = None,
-    robust: args.RobustOption = None,
-    guess: args.GuessOption = None,
     preset: Annotated[
         Literal["opencsp"] | None, typer.Option(help="Do exactly what OpenCSP's own calibration does.")
     ] = None,
@@ -58,27 +54,15 @@ def calibrate(
     """Calibrate a camera from photographs of a board."""
     from opencsp_calib import dropping, pipeline
     from opencsp_calib.images import as_text, find_images
-    from opencsp_calib.options import aspect_from
 
     check_targets(output, report)
-    options = _preset(
-        preset,
-        detector=detector,
-        refine=refine,
-        model=model,
-        solver=solver,
-        board_shape=board_shape,
-        pixel_aspect=aspect_from(pixel_aspect),
-        weights=weights,
-        robust=robust,
-    )
+    options = _preset(preset, args.given(detector=detector, refine=refine) | solving)
     finding = {key: options.pop(key) for key in ("detector", "refine") if key in options}
     started = time.perf_counter()
     target = pipeline.board_from(board)
     files = find_images(images)
     check_not_input(files, output, report)
     record = _record(note or [], pixel_pitch)
-    options |= args.given(guess=args.guess_from(guess))
     options |= {
         "name": name or as_text(files[0].path.absolute().parent.name),
         "record": record,
@@ -134,17 +118,12 @@ def detect(
         print_json(observations_as_json(found, seconds, str(output)))
 
 
+@with_solving_options
 def solve(
     file: Annotated[
         Path, typer.Argument(metavar="FILE", help="An observations file, or a camera file to solve again.")
     ],
-    model: args.Model = None,
-    solver: args.SolverName = None,
-    board_shape: args.BoardShapeOption = None,
-    pixel_aspect: args.PixelAspectOption = None,
-    weights: args.WeightsOption = None,
-    robust: args.RobustOption = None,
-    guess: args.GuessOption = None,
+    solving: dict[str, Any],
     output: args.Output = None,
     report: args.Report = None,
     json: args.Json = False,
@@ -152,21 +131,11 @@ def solve(
     """Solve again from what `detect` or `calibrate` kept; a camera file repeats its own run unless told otherwise."""
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
-    from opencsp_calib.options import aspect_from
 
     check_targets(output, report)
     observations = load_observations(file)
-    asked = args.given(
-        model=model,
-        solver=solver,
-        board_shape=board_shape,
-        pixel_aspect=aspect_from(pixel_aspect),
-        weights=weights,
-        robust=robust,
-        guess=args.guess_from(guess),
-    )
     started = time.perf_counter()
-    result = pipeline.solve(observations, **{"name": file.stem, **_as_before(file), **asked})
+    result = pipeline.solve(observations, **{"name": file.stem, **_as_before(file), **solving})
     seconds = {"detect": 0.0, "solve": time.perf_counter() - started, "total": time.perf_counter() - started}
     _finish(result, None, seconds, output, report, json)
 
@@ -203,22 +172,23 @@ def _selected(observations: "Observations", count: int, options: dict[str, Any])
     return found.observations
 
 
-def _preset(preset: str | None, **options: Any) -> dict[str, Any]:
+def _preset(preset: str | None, asked: dict[str, Any]) -> dict[str, Any]:
+    """The options of a preset; with it, only the guess is free."""
     from opencsp_calib.options import PRESETS
 
-    asked = args.given(**options)
     if preset is None:
         return asked
     meant = PRESETS[preset]
     for key, value in asked.items():
-        if value != meant[key]:
+        if value != meant.get(key, value):
             flag = "--" + key.replace("_", "-")
             raise InputError(f"--preset {preset} means {flag} {meant[key]}; leave {flag} {value} or the preset")
-    return dict(meant)
+    return {**asked, **meant}
 
 
 def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
-    from opencsp_calib.summary import PIXEL_PITCH, notes_from
+    from opencsp_calib.summary import PIXEL_PITCH
+    from opencsp_calib.typed import notes_from
 
     record = notes_from(notes)
     return record | ({PIXEL_PITCH: f"{pixel_pitch:g}"} if pixel_pitch else {})

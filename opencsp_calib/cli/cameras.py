@@ -99,8 +99,8 @@ def undistort(
     image_size: ImageSize = None,
 ) -> None:
     """Remove the lens distortion from images; they come out as a pinhole camera would have taken them."""
-    from opencsp_calib.camera_files import undistort_images
     from opencsp_calib.images import find_images
+    from opencsp_calib.undistortion import undistort_images
 
     lens = camera_in(camera, name, image_size)
     files = find_images(images)

@@ -128,7 +128,9 @@ def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Boa
 
 
 def _is_file(images: list[str]) -> bool:
-    return len(images) == 1 and Path(images[0]).suffix.lower() in (".h5", ".hdf5")
+    from opencsp_calib.hdf5 import EXTENSIONS
+
+    return len(images) == 1 and Path(images[0]).suffix.lower() in EXTENSIONS
 
 
 def _say_validation(found: "Validation") -> None:

@@ -38,13 +38,14 @@ def convert(
     from opencsp_calib import camera_files
     from opencsp_calib.atomic import check_writable
     from opencsp_calib.summary import camera_as_json
+    from opencsp_calib.typed import camera_from
 
     out = Path(source) if params is not None and target is None else target
     if out is None or (params is not None and target is not None):
         raise InputError("convert takes IN and OUT, or with --params only OUT")
     check_writable(out)
     if params is not None:
-        typed = camera_files.typed_camera(params, model, image_size, name or out.stem)
+        typed = camera_from(params, model, image_size, name or out.stem)
         converted = camera_files.Converted(typed, {})
     else:
         opened = camera_files.read_camera_file(source, camera, from_format, image_size)

@@ -8,6 +8,7 @@ import typer
 
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import print_json, progress_bar, say, say_table
+from opencsp_calib.cli.solving_options import Model, SolverName
 from opencsp_calib.errors import CancelledError, InputError
 
 if TYPE_CHECKING:
@@ -25,8 +26,8 @@ def fleet(
         ),
     ],
     board: args.OptionalBoardSpec = None,
-    model: args.Model = None,
-    solver: args.SolverName = None,
+    model: Model = None,
+    solver: SolverName = None,
     jobs: args.Jobs = None,
     resume: args.Resume = False,
     scheduler: args.SchedulerAddress = None,

@@ -26,7 +26,7 @@ def board(
     from opencsp_calib.registry import installed
 
     target = board_from(spec)
-    write_board(target, installed().boards[target.kind].draw(target), output)
+    write_board(target, installed().board_kind(target.kind).draw(target), output)
     say(f"board saved: {output}; print it at 100 %, and measure its scale bar")
 
 

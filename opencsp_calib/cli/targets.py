@@ -10,17 +10,16 @@ if TYPE_CHECKING:
 
 __all__ = ["check_not_input", "check_targets"]
 
-HDF5_ENDINGS = ("", ".h5", ".hdf5", ".hdf")
-
 
 def check_targets(output: Path | None, report: Path | None = None) -> None:
     """Before any work: whether its results can be written, and have names that say what they are."""
     from opencsp_calib.atomic import check_writable
+    from opencsp_calib.hdf5 import EXTENSIONS
 
     for path in (output, report):
         if path is not None:
             check_writable(path)
-    if output and output.suffix.lower() not in HDF5_ENDINGS:
+    if output and output.suffix.lower() not in ("", *EXTENSIONS):
         _check_no_other_format(output)
 
 

@@ -16,7 +16,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import compare
 from opencsp_calib.conformance.kit import Promise, Setup, promise
 from opencsp_calib.conformance.worlds import BOARD, VIEWS, World, edited, main_model, world
-from opencsp_calib.convergence import remaining_sigmas
+from opencsp_calib.convergence import CONVERGED_SIGMAS, remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.interfaces import Solver
@@ -29,7 +29,6 @@ __all__ = ["CHECKS", "EXACT_PX", "found", "model_checks"]
 EXACT_PX = 1e-3
 RICH_PX, RICH_COEFFICIENTS = 0.1, 6  # what is allowed in the image's corners from that many coefficients on
 UNALIGNED_PX = 0.2  # the frames not aligned: a turn of the camera hides there, and half a pixel would be 0.5
-CONVERGED_SIGMAS = 0.1
 
 
 def found(solver: Solver, seen: World, options: SolveOptions | None = None) -> Calibration:

@@ -17,22 +17,8 @@ __all__ = ["BOARD", "VIEWS", "World", "camera_of", "edited", "main_model", "worl
 VIEWS = 16
 BOARD = Checkerboard(12, 9, 0.03)
 IMAGE_SIZE = (1280, 960)
-COEFFICIENTS = (
-    -0.21,
-    0.09,
-    0.0011,
-    -0.0007,
-    -0.021,
-    0.05,
-    0.02,
-    0.004,
-    0.0012,
-    -0.0006,
-    -0.0009,
-    0.0004,
-    0.011,
-    -0.007,
-)
+RADIAL_AND_TANGENTIAL, MORE_RADIAL = (-0.21, 0.09, 0.0011, -0.0007), (-0.021, 0.05, 0.02, 0.004)
+COEFFICIENTS = (*RADIAL_AND_TANGENTIAL, *MORE_RADIAL, 0.0012, -0.0006, -0.0009, 0.0004, 0.011, -0.007)
 FISHEYE = (0.021, -0.006, 0.0031, -0.0012)
 
 

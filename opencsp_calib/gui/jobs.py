@@ -168,8 +168,9 @@ def undistort(tell: Tell, camera: str, images: list[str], folder: str) -> None:
     """Write photographs without their lens distortion into another folder."""
     from pathlib import Path
 
-    from opencsp_calib.camera_files import read_camera_file, undistort_images
+    from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.images import find_images
+    from opencsp_calib.undistortion import undistort_images
 
     def progress(done: int, total: int) -> None:
         tell({"done_images": done, "total": total})

@@ -8,6 +8,7 @@ from opencsp_calib.board import Board, CharucoBoard, Checkerboard
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.files import shown
 from opencsp_calib.gui.session import Session, described
+from opencsp_calib.hdf5 import EXTENSIONS
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_observations
 from opencsp_calib.registry import installed
 
@@ -18,7 +19,7 @@ OF_SOLVING = ("model", "solver", "board_shape", "pixel_aspect", "weights")
 
 def is_kept(path: Path) -> bool:
     """Whether a path is that of a file which may hold corners, by its name."""
-    return path.is_file() and path.suffix.lower() in (".h5", ".hdf5")
+    return path.is_file() and path.suffix.lower() in EXTENSIONS
 
 
 def take_up(session: Session, path: Path) -> None:

@@ -6,10 +6,11 @@ from typing import Any
 
 from opencsp_calib.board import Board
 from opencsp_calib.errors import BoardSpecError, InputError
-from opencsp_calib.options import PRESETS, aspect_from
+from opencsp_calib.options import PRESETS
 from opencsp_calib.pipeline import DEFAULT_MODEL, DEFAULT_SOLVER
 from opencsp_calib.registry import installed
-from opencsp_calib.summary import PIXEL_PITCH, notes_from
+from opencsp_calib.summary import PIXEL_PITCH
+from opencsp_calib.typed import aspect_from, notes_from
 
 __all__ = ["BY_FIELDS", "Settings"]
 

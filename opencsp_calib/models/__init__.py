@@ -12,7 +12,7 @@ from opencsp_calib.models.base import LensModel
 from opencsp_calib.models.fisheye import FisheyeModel
 from opencsp_calib.models.opencv import OpenCVModel
 
-__all__ = ["LENS_MODELS", "LensModel", "lens_model"]
+__all__ = ["LENS_MODELS", "OPENCV_MODELS", "LensModel", "lens_model"]
 
 LENS_MODELS: Mapping[str, LensModel] = MappingProxyType(
     {
@@ -28,6 +28,10 @@ LENS_MODELS: Mapping[str, LensModel] = MappingProxyType(
         )
     }
 )
+OPENCV_MODELS: Mapping[int, str] = MappingProxyType(
+    {len(model.distortion_names): model.name for model in LENS_MODELS.values() if isinstance(model, OpenCVModel)}
+)
+"""The lens models of OpenCV's family by how many distortion coefficients they have: 0, 4, 5, 8, 12 or 14."""
 
 
 def lens_model(name: str) -> LensModel:

@@ -12,7 +12,7 @@ from opencsp_calib import InputError
 from opencsp_calib_basler import features
 from opencsp_calib_basler.sentences import busy, is_busy, sentence
 
-__all__ = ["connected", "held_alone", "make_ready", "serial_numbers"]
+__all__ = ["PACKET_HINT", "connected", "held_alone", "make_ready", "serial_numbers"]
 
 log = logging.getLogger("opencsp_calib.basler")
 
@@ -21,6 +21,7 @@ SETTLED_FRAMES = 10
 REGION = (("OffsetX", features.lowest), ("OffsetY", features.lowest))
 SIDES = (("Width", features.highest), ("Height", features.highest))
 SMALL_PACKET = 1500  # bytes; what an adapter without jumbo frames carries
+PACKET_HINT = "if frames get lost, set the adapter's MTU to 9000 (jumbo frames) and --set GevSCPSPacketSize=8192"
 
 
 def serial_numbers() -> list[str]:
@@ -138,6 +139,3 @@ def _hint_at_packets(camera: Any, nodes: Any) -> None:
     packet = features.read(nodes, "GevSCPSPacketSize")
     if camera.GetDeviceInfo().GetDeviceClass() == "BaslerGigE" and int(packet or SMALL_PACKET) <= SMALL_PACKET:
         log.warning("GigE packets of %s bytes: %s", packet, PACKET_HINT)
-
-
-PACKET_HINT = "if frames get lost, set the adapter's MTU to 9000 (jumbo frames) and --set GevSCPSPacketSize=8192"

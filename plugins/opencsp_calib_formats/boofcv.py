@@ -16,6 +16,7 @@ from opencsp_calib.arrays import Floats, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, equidistant, omni, on_plane
 from opencsp_calib_formats.other_camera import other_camera
@@ -102,7 +103,7 @@ def _brown(name: str, fields: Fields, pinhole: _Pinhole, xi: float) -> Imported:
     k1, k2, k3 = (*radial, 0.0, 0.0, 0.0)[:3]
     count = 5 if len(radial) == 3 else 4 if "radial_tangential" in fields else 0
     params = np.array([*pinhole.intrinsics, k1, k2, t1, t2, k3])[: 4 + count]
-    return as_imported(name, f"opencv{count}" if count else "pinhole", params, pinhole.size, (HALF_PIXEL,))
+    return as_imported(name, OPENCV_MODELS[count], params, pinhole.size, (HALF_PIXEL,))
 
 
 def _kannala_brandt(name: str, fields: Fields, pinhole: _Pinhole) -> Imported:

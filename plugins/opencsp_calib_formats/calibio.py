@@ -13,6 +13,7 @@ import numpy as np
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.other_camera import each_camera
 from opencsp_calib_formats.reading import FileFormat, naming
@@ -71,9 +72,9 @@ def _imported(name: str, model: Fields, kind: str) -> Imported:
     parameters = data.fields("parameters")
     f, ar, cx, cy = (_value(parameters, key) for key in ("f", "ar", "cx", "cy"))
     d = np.array([_value(parameters, key, 0.0) for key in COEFFICIENTS])
-    count = next(n for n in (0, 4, 5, 8, 12, 14) if not d[n:].any())
+    count = next(n for n in OPENCV_MODELS if not d[n:].any())
     params = np.array([f, f * ar, cx, cy, *d[:count]])
-    return as_imported(name, f"opencv{count}" if count else "pinhole", params, size)
+    return as_imported(name, OPENCV_MODELS[count], params, size)
 
 
 def _value(parameters: Fields, key: str, default: float | None = None) -> float:

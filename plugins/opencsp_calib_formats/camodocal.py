@@ -90,9 +90,8 @@ def _pinhole_full(name: str, fields: Fields, size: Size) -> Imported:
 def _kannala_brandt(name: str, fields: Fields, size: Size) -> Imported:
     names = ("k2", "k3", "k4", "k5")
     elsewhere = "distortion_parameters" in fields and not fields.fields("projection_parameters").first(*names)
-    k = (
-        _distortion(fields, names) if elsewhere else _intrinsics(fields, *names)
-    )  # converters from Kalibr put them there
+    # converters from Kalibr put them there
+    k = _distortion(fields, names) if elsewhere else _intrinsics(fields, *names)
     params = [*_intrinsics(fields, "mu", "mv", "u0", "v0"), *k]
     return as_imported(name, "opencv_fisheye", np.array(params), size)
 

@@ -149,9 +149,7 @@ def whole(value: Any, what: str) -> int:
 def numbers(value: Any, what: str, *counts: int) -> Floats:
     """(n,) finite numbers of a list, a nested list, a map with ``data``, or a text of numbers between white space."""
     if isinstance(value, Mapping):
-        return (
-            _mapped(Fields(value, what))[0] if not counts else _counted(_mapped(Fields(value, what))[0], what, counts)
-        )
+        return _counted(_mapped(Fields(value, what))[0], what, counts)
     if isinstance(value, str):
         value = value.replace(",", " ").split()
     flat = [number(item, what) for item in _flat(value, what)]

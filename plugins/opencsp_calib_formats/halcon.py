@@ -22,7 +22,7 @@ from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
-from opencsp_calib_formats.lens import division, inverse_brown, on_plane
+from opencsp_calib_formats.lens import INVERSE, division, inverse_brown, on_plane
 from opencsp_calib_formats.other_camera import other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, unverified
 from opencsp_calib_formats.safe_text import head, once, read_text
@@ -35,7 +35,6 @@ POLYNOMIAL = ("Poly1", "Poly2", "Poly3", "Poly4", "Poly5")
 OTHER_CAMERAS = ("Magnification", "Tilt", "Rot", "ImagePlaneDist", "Vx", "Vy", "Vz", "SensorType", "HyperFocus")
 LINES_BETWEEN = ("ParGroup", "DOUBLE", "INT", "STRING")
 AREA_SCAN = ("area_scan_division", "area_scan_polynomial")
-INVERSE = "it corrects what was measured; our models distort what is seen"
 ORDER = unverified("Poly4 and Poly5 are taken in the order that two converters agree on, which was not verified")
 
 

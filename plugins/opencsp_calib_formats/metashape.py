@@ -22,6 +22,7 @@ from opencsp_calib.arrays import Floats, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields, number
 from opencsp_calib_formats.lens import brown, equidistant, equisolid, on_plane
 from opencsp_calib_formats.opencv_camera import carried
@@ -171,7 +172,7 @@ def _of_terms(
         return as_imported(name, "opencv_fisheye", np.array([*intrinsics, *radial]), size, notes)
     count = 5 if "k3" in terms else 4 if terms.keys() & {"k1", "k2", "p1", "p2"} else 0
     params = np.array([*intrinsics, *radial[:2], p1, p2, radial[2]])[: 4 + count]
-    return as_imported(name, f"opencv{count}" if count else "pinhole", params, size, notes)
+    return as_imported(name, OPENCV_MODELS[count], params, size, notes)
 
 
 def _obstacles(terms: dict[str, float], kind: str) -> tuple[str, ...]:

@@ -26,7 +26,7 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.lens import on_plane
 from opencsp_calib_formats.other_camera import other_camera
 
-__all__ = ["imported", "opencv_of_cahvor"]
+__all__ = ["imported"]
 
 COEFFICIENTS = {"PINHOLE": 0, "OPENCV4": 4, "OPENCV5": 5, "OPENCV8": 8, "OPENCV12": 12}
 COEFFICIENTS |= {"STEREOGRAPHIC": 0, "LONLAT": 0, "LATLON": 0, "CAHVOR": 5, "CAHVORE": 8}
@@ -68,14 +68,14 @@ def imported(name: str, lensmodel: str, intrinsics: Floats, image_size: tuple[in
     if model in OURS:
         return as_imported(name, OURS[model], intrinsics, image_size)
     if model == "CAHVOR" and not intrinsics[4:6].any():
-        return as_imported(name, "opencv4", opencv_of_cahvor(intrinsics), image_size)
+        return as_imported(name, "opencv4", _opencv_of_cahvor(intrinsics), image_size)
     core = (float(intrinsics[0]), float(intrinsics[1]), float(intrinsics[2]), float(intrinsics[3]))
     plane = _plane(model, intrinsics[4:], _linearity(lensmodel) if model == "CAHVORE" else 0.0)
     notes = (MOVING_PUPIL,) if model == "CAHVORE" and intrinsics[9:].any() else ()
     return other_camera(name, _obstacles(model, intrinsics), plane, core, image_size, notes)
 
 
-def opencv_of_cahvor(intrinsics: Floats) -> Floats:
+def _opencv_of_cahvor(intrinsics: Floats) -> Floats:
     """The parameters of `opencv4` that equal a CAHVOR whose axis is straight ahead."""
     fx, fy, cx, cy, _, _, r0, r1, r2 = intrinsics
     if not 1.0 + r0 > 0:

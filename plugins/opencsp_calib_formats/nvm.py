@@ -17,7 +17,7 @@ from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import number
-from opencsp_calib_formats.lens import inverse_brown, on_plane
+from opencsp_calib_formats.lens import INVERSE, inverse_brown, on_plane
 from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, unverified
 from opencsp_calib_formats.safe_text import MAX_BYTES, head
@@ -95,5 +95,5 @@ def _imported(name: str, f: float, r: float, fixed: Centred | None) -> Imported:
 def _of_intrinsics(name: str, intrinsics: Centred, r: float, size: Size | None) -> Imported:
     if r == 0:
         return as_imported(name, "pinhole", np.array(intrinsics), size, (CENTRE,))
-    obstacle = f"r = {r:g} (it corrects what was measured; our models distort what is seen)"
+    obstacle = f"r = {r:g} ({INVERSE})"
     return other_camera(name, (obstacle,), lambda p: inverse_brown(on_plane(p), (r,)), intrinsics, size, (CENTRE,))

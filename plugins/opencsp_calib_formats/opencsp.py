@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from opencsp_calib import Camera, InputError
-from opencsp_calib.hdf5 import opened, read_camera, save_camera
+from opencsp_calib.hdf5 import EXTENSIONS, opened, read_camera, save_camera
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.reading import FileFormat, naming, only_one
 
@@ -16,7 +16,7 @@ class OpenCSP(FileFormat):
 
     name = "opencsp"
     title = "OpenCSP camera (HDF5)"
-    extensions = (".h5", ".hdf5", ".hdf")
+    extensions = EXTENSIONS
     writes = True
     models = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12", "opencv14", "opencv_fisheye")
 

@@ -10,11 +10,9 @@ from opencsp_calib.arrays import Floats, Params, Pixels, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
-from opencsp_calib.models import lens_model
+from opencsp_calib.models import OPENCV_MODELS, lens_model
 
-__all__ = ["MODEL_OF_COUNT", "carried", "either_model", "opencv_camera", "through_matrix"]
-
-MODEL_OF_COUNT = {0: "pinhole", 4: "opencv4", 5: "opencv5", 8: "opencv8", 12: "opencv12", 14: "opencv14"}
+__all__ = ["carried", "either_model", "opencv_camera"]
 
 
 def opencv_camera(
@@ -50,16 +48,16 @@ def opencv_camera(
         raise FileFormatError(f"camera {name!r}: {matrix.tolist()} is no camera matrix [fx 0 cx; 0 fy cy; 0 0 1]")
     if fisheye and len(coefficients) == 0:
         coefficients = np.zeros(4)
-    if (fisheye and len(coefficients) != 4) or len(coefficients) not in MODEL_OF_COUNT:
+    if (fisheye and len(coefficients) != 4) or len(coefficients) not in OPENCV_MODELS:
         counts = "4" if fisheye else "0, 4, 5, 8, 12 or 14"
         raise FileFormatError(f"camera {name!r} has {len(coefficients)} distortion coefficients, expected {counts}")
-    model = "opencv_fisheye" if fisheye else MODEL_OF_COUNT[len(coefficients)]
+    model = "opencv_fisheye" if fisheye else OPENCV_MODELS[len(coefficients)]
     params = np.array([fx, fy, cx, cy, *coefficients])
     imported = as_imported(name, model, params, image_size, notes)
     if skew == 0:
         return imported
     obstacle = f"skew = {skew:g} px (our models have none)"
-    return not_exactly((obstacle,), through_matrix(model, coefficients, matrix), image_size, notes)
+    return not_exactly((obstacle,), _through_matrix(model, coefficients, matrix), image_size, notes)
 
 
 def either_model(
@@ -78,7 +76,7 @@ def either_model(
     }
 
 
-def through_matrix(model: str, coefficients: Params, matrix: Floats) -> Callable[[Points], Pixels]:
+def _through_matrix(model: str, coefficients: Params, matrix: Floats) -> Callable[[Points], Pixels]:
     """A projection with a general camera matrix behind a model's distortion: u = fx x' + s y' + cx."""
     lens = lens_model(model)
     normalised = np.concatenate([[1.0, 1.0, 0.0, 0.0], coefficients])
@@ -107,7 +105,7 @@ def carried(camera: Camera, models: tuple[str, ...], path: Path, title: str) -> 
     """
     if camera.model in models:
         return camera.model, camera.distortion
-    counts = {model: count for count, model in MODEL_OF_COUNT.items()}
+    counts = {model: count for count, model in OPENCV_MODELS.items()}
     needed = int(np.flatnonzero(camera.distortion).max(initial=-1)) + 1
     if camera.model in counts:
         for model in sorted((m for m in models if m in counts), key=counts.__getitem__):

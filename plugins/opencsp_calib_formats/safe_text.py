@@ -24,7 +24,8 @@ from opencsp_calib.errors import FileFormatError
 
 tomllib: Any = importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
 
-__all__ = ["Repeated", "head", "once", "parse_json", "parse_toml", "parse_xml", "parse_yaml", "read_bytes", "read_text"]
+__all__ = ["MAX_BYTES", "Repeated", "head", "once", "parse_json", "parse_toml", "parse_xml", "parse_yaml", "read_bytes"]
+__all__ += ["read_text"]
 
 MAX_BYTES = 32 * 2**20
 MAX_YAML = 8 * 2**20  # its parser takes a second a megabyte where nesting is deep

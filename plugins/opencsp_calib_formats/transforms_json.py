@@ -17,6 +17,7 @@ from opencsp_calib import Camera
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, on_plane
 from opencsp_calib_formats.opencv_camera import carried
@@ -106,7 +107,7 @@ def _of_size(name: str, fields: Fields, model: str, size: Size | None) -> Import
         return other_camera(name, (obstacle,), lambda p: brown(on_plane(p), radial, (p1, p2)), intrinsics, size)
     count = 5 if fields.first("k3") else 4 if fields.first("k1", "k2", "p1", "p2") else 0
     params = np.array([*intrinsics, k1, k2, p1, p2, k3])[: 4 + count]
-    return as_imported(name, f"opencv{count}" if count else "pinhole", params, size)
+    return as_imported(name, OPENCV_MODELS[count], params, size)
 
 
 def _intrinsics(fields: Fields, size: Size) -> Intrinsics:

@@ -12,6 +12,7 @@ import numpy as np
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
+from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import fov, on_plane
 from opencsp_calib_formats.other_camera import other_camera
@@ -64,7 +65,7 @@ def _imported(name: str, fields: Fields, kind: str) -> Imported:
     if kind == "TSAI":
         d = [fields.number(key) for key in ("k1", "k2", "p1", "p2", *(("k3",) if "k3" in fields else ()))]
         notes = (HALF_PIXEL, BEFORE) if any(d[2:4]) else (HALF_PIXEL,)
-        return as_imported(name, f"opencv{len(d)}", np.array([fx, fy, cx, cy, *d]), None, notes)
+        return as_imported(name, OPENCV_MODELS[len(d)], np.array([fx, fy, cx, cy, *d]), None, notes)
     if kind == "FISHEYE":
         d = [fields.number(key) for key in ("k1", "k2", "k3", "k4")]
         return as_imported(name, "opencv_fisheye", np.array([fx, fy, cx, cy, *d]), None, (HALF_PIXEL,))

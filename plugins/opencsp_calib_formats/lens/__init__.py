@@ -11,12 +11,13 @@ from opencsp_calib_formats.lens.double_sphere import double_sphere
 from opencsp_calib_formats.lens.eucm import eucm
 from opencsp_calib_formats.lens.fisheye import equidistant, equisolid
 from opencsp_calib_formats.lens.fov import fov
-from opencsp_calib_formats.lens.inverse_brown import inverse_brown
+from opencsp_calib_formats.lens.inverse_brown import INVERSE, inverse_brown
 from opencsp_calib_formats.lens.ocam import ocam
 from opencsp_calib_formats.lens.omni import omni
 from opencsp_calib_formats.lens.plane import on_plane, to_pixels
 
 __all__ = [
+    "INVERSE",
     "brown",
     "division",
     "double_sphere",

@@ -12,7 +12,10 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.models.base import inverse_radius
 from opencsp_calib_formats.lens.brown import brown_with_jacobian, fold
 
-__all__ = ["inverse_brown"]
+__all__ = ["INVERSE", "inverse_brown"]
+
+INVERSE = "it corrects what was measured; our models distort what is seen"
+"""Why such a model is none of ours, for messages."""
 
 CONVERGED = 1e-14  # of plane coordinates: far below 1e-9 px at any focal length
 FAR = 1e3  # of plane coordinates: nothing is imaged there
