@@ -26,7 +26,8 @@ exclude_patterns = ["_build", "example_plugin"]
 def setup(app: object) -> None:
     """Write the pages that are made from what they are about, so that they are never out of date."""
     import command_page
+    import modules_page
     import studies_page
 
-    for name, page in (("commands", command_page.page), ("studies", studies_page.page)):
-        (HERE / f"{name}.md").write_text(page(), encoding="utf-8")
+    for name, made in (("commands", command_page), ("modules", modules_page), ("studies", studies_page)):
+        (HERE / f"{name}.md").write_text(made.page(), encoding="utf-8")

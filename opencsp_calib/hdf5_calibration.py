@@ -5,7 +5,7 @@
     /Calibration
         observations/                what went in; a file of only this is what ``detect`` writes
             image_size      (2,) i4
-            board           JSON     spec, columns, rows, spacing_m
+            board           JSON     spec, columns, rows, spacing_m; of ChArUco: marker_m, dictionary, inverted, legacy
             board_points    (K, 3) f8  m
             views           JSON     of every image looked at: image, sha256, status, problems, reason, rejected
             corners         (n,) i4  how many corners each view has; the next five are those of all views on end

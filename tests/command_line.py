@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from json_page import assert_as_documented
 
 from opencsp_calib.cli import run
 
@@ -10,11 +11,13 @@ QUICK = ("--solver", "opencv")
 
 
 def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
-    """The JSON that a command prints; standard output must hold nothing else."""
+    """The JSON that a command prints, which must be as documented; standard output must hold nothing else."""
     code = run([*map(str, arguments), "--json"])
     output = capsys.readouterr()
     assert code == 0, output.err
-    return json.loads(output.out)
+    printed = json.loads(output.out)
+    assert_as_documented(str(arguments[0]), printed)
+    return printed
 
 
 def complaint(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 2) -> str:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from json_page import assert_as_documented
 from opencsp_calib_bundle.solver import BundleSolver
 
 from opencsp_calib import (
@@ -117,7 +118,7 @@ def test_a_bent_board_does_not_make_a_good_camera_wrong_where_its_shape_was_solv
 
 def test_what_it_says() -> None:
     found = check(changed(fx=13.5, fy=13.5), photographed(), solve)
-    assert found.as_json().keys() == {"rms_px", "worst_px", "predicted_px", "verdict"}
+    assert_as_documented("check", found.as_json())
     assert found.as_json()["verdict"] == "wrong"
     assert 1.0 < found.at_range.difference.range_m < 10.0
     assert "at infinity the camera is" in found.reasons[0]

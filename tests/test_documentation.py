@@ -17,17 +17,19 @@ import pytest
 import typer
 import yaml
 from format_files_calibration import FILES
+from json_page import documented
 from typer.testing import CliRunner
 
 import opencsp_calib
 from opencsp_calib import Camera, Checkerboard, cli
 from opencsp_calib.images import write_image
+from opencsp_calib.looking import OTHER_BOARD
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import seed_poses
 
 ROOT = Path(__file__).resolve().parents[1]
-GENERATED = {"commands.md", "studies.md"}
+GENERATED = {"commands.md", "modules.md", "studies.md"}
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 PAGES += [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in GENERATED]
 SHORTER = {
@@ -147,12 +149,20 @@ def test_every_public_name_is_on_the_page_of_python() -> None:
     assert not missing
 
 
+def test_what_every_command_prints_for_programs_is_on_a_page() -> None:
+    commands = typer.main.get_command(cli.app).commands
+    printing = {name for name, command in commands.items() if any("--json" in p.opts for p in command.params)}
+    assert set(documented()) == printing
+
+
 def test_every_warning_is_among_the_symptoms() -> None:
     said = (ROOT / "docs/symptoms.md").read_text(encoding="utf-8")
     files = [*(ROOT / "opencsp_calib").rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
     source = "\n".join(path.read_text(encoding="utf-8") for path in files)
     codes = set(re.findall(r"Problem\(\s*\"([a-z-]+)\"", source))
+    codes |= set(re.findall(r"^[A-Z_]+ = \"([a-z]+-[a-z-]+)\"  # the problem of", source, re.MULTILINE))
     assert len(codes) > 30
+    assert OTHER_BOARD in codes
     assert sorted(code for code in codes if f"`{code}`" not in said) == []
 
 

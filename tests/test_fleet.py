@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from json_page import assert_as_documented
 from worlds import SmallWorld
 
 from opencsp_calib import Camera
@@ -36,7 +37,9 @@ def answer(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 0
     assert run([*map(str, arguments), "--json"]) == code
     output = capsys.readouterr()
     assert "Traceback" not in output.err
-    return json.loads(output.out)
+    printed = json.loads(output.out)
+    assert_as_documented("fleet", printed)
+    return printed
 
 
 def test_a_fleet(photographs: Path, refocused: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

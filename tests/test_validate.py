@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from json_page import assert_as_documented
 from opencsp_calib_bundle.solver import BundleSolver
 from opencsp_calib_opencv.solver import OpenCVSolver
 
@@ -110,14 +111,10 @@ def test_both_ways_to_take_the_board_are_shown(validation: Validation) -> None:
     assert any("solving for the board's shape moves the camera" in reason for reason in validation.reasons)
 
 
-def test_json_is_as_the_design_has_it(validation: Validation) -> None:
+def test_json_is_as_documented(validation: Validation) -> None:
     found = json.loads(json.dumps(validation.as_json(), allow_nan=False))
-    assert list(found) == ["solvers", "differences", "halves", "held_out", "models", "verdict", "reasons"]
-    assert list(found["solvers"]["bundle"]) == ["version", "rms_px", "params", "seconds"]
+    assert_as_documented("validate", found)
     assert list(found["solvers"]["bundle"]["params"]) == list(CAMERA.lens.parameter_names)
-    assert list(found["differences"][0]) == ["a", "b", "rms_px", "worst_px", "agree"]
-    assert list(found["halves"]) == ["median_px", "worst_px", "predicted_px"]
-    assert list(found["held_out"]) == ["rms_px"]
     assert sum(model["supported"] for model in found["models"]) == 1
 
 

@@ -31,7 +31,7 @@ def validate(
     report: args.Report = None,
     json: args.Json = False,
 ) -> None:
-    """Let every solver, both halves of the views, and the models in order answer the same question."""
+    """Let every solver, both halves of the views, and lens models from simple to rich answer the same question."""
     from opencsp_calib.atomic import check_writable
     from opencsp_calib.report import write_validation
     from opencsp_calib.validate import validate as validated
