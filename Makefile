@@ -69,7 +69,7 @@ release: $(VENV)/.dev
 	rm -rf .venv-release dist/demo
 
 # What users of the main job install; quick when it is there.
-$(VENV)/.core: pyproject.toml
+$(VENV)/.core: pyproject.toml $(wildcard native/*)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(INSTALL) --upgrade 'pip>=25.1'
 	$(INSTALL) --editable '.[opencv]'

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Covariances, Floats, Ids, Mask, Pixels
-from opencsp_calib.corner_kernel.layout import DIAGNOSTICS, PARAMETERS
+from opencsp_calib.corner_kernel import DIAGNOSTICS, PARAMETERS
 
 __all__ = ["CornerFit", "Levels", "begin"]
 
@@ -22,7 +22,7 @@ HIDDEN_BY_SATURATION = 0.12  # of the edge width: what a change of the light mov
 
 @dataclass(frozen=True, eq=False)
 class CornerFit:
-    """The parameters of the image of each corner, and how they were found; see `opencsp_calib.corner_kernel.fitting`.
+    """The parameters of the image of each corner, and how they were found; see `opencsp_calib.corner_kernel`.
 
     Parameters
     ----------

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
-from opencsp_calib.compiled import corner_fit
 from opencsp_calib.corner_fit import CornerFit, Levels
-from opencsp_calib.corner_kernel.layout import COLUMNS, DIAGNOSTICS, FAILED, MOST_PIXELS, RAMP_PX, SIDE
+from opencsp_calib.corner_kernel import DIAGNOSTICS, FAILED, RAMP_PX, fit_corners
 
 __all__ = ["FULL", "NEAR", "SMALL", "Surroundings", "WindowSize"]
 
@@ -72,11 +71,9 @@ class Surroundings:
         windows = self.windows(start, size)
         chosen = np.flatnonzero(where & np.isfinite(windows[:, 0]))
         parameters = start.parameters[chosen]
-        found = np.zeros((len(chosen), DIAGNOSTICS))
-        table, picture = np.empty((COLUMNS, MOST_PIXELS)), np.empty((SIDE, SIDE))
-        corner_fit()(
-            self.image, float(self.white), parameters, self.bends[chosen], windows[chosen],
-            size.tolerance_px, MOST_STEPS, examine, table, picture, found,
+        found = fit_corners(
+            self.image, self.white, parameters, self.bends[chosen], windows[chosen], size.tolerance_px, MOST_STEPS,
+            examine=examine,
         )  # fmt: skip
         nothing = CornerFit(start.parameters, np.full((len(where), DIAGNOSTICS), float(FAILED)))
         return nothing.replaced(chosen, CornerFit(parameters, found))

@@ -12,7 +12,6 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
 from opencsp_calib.board import Board, CharucoBoard
-from opencsp_calib.compiled import prepare
 from opencsp_calib.corner_fit import CornerFit, begin
 from opencsp_calib.corner_grid import bends, edges
 from opencsp_calib.corner_judgement import moved, rejections, summary
@@ -21,7 +20,7 @@ from opencsp_calib.detection import Detection
 from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 
-__all__ = ["prepare", "refine"]
+__all__ = ["refine"]
 
 CLEAN_MISFIT = 0.08  # of the amplitude; above it a smaller window is tried
 SAME_PLACE_PX = 0.5

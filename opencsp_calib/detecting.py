@@ -14,7 +14,6 @@ from typing import TypeAlias
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.cluster import Scheduler, connected
-from opencsp_calib.corners import prepare
 from opencsp_calib.detection import Detection, Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
 from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
@@ -76,8 +75,6 @@ def look_at(
             examine, threads = cluster.look, jobs or cluster.in_flight
         else:
             examine, threads = search.look, jobs or usable_cores()
-            if search.refine == "model":
-                prepare()  # loads the compiled fit while the first images are read
         looks = _in_threads(files, lambda file: _look(file, examine, journal), threads, ended, progress, stop)
     return _gathered(looks, search.board)
 

@@ -99,5 +99,5 @@ def find_board(image: Image, board: Board, detector: Detector, refine: Refine) -
 def engine_versions() -> dict[str, str]:
     """The versions of everything that has a hand in finding corners."""
     plugins = {point.dist.name: point.dist.version for point in entry_points(group=GROUP) if point.dist}
-    engines = {name: version(name) for name in ("numba", "numpy", "scipy")}
+    engines = {name: version(name) for name in ("opencsp-calib", "numpy", "scipy")}
     return dict(sorted({**plugins, **engines, "opencv": opencv_version()}.items()))

@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors process_setting",
-    "arrays atomic opencv blas processes provenance seal",
+    "arrays atomic native opencv blas processes provenance seal",
     "models",
     "camera rotations convex_hull board",
     "pose",
@@ -22,7 +22,7 @@ TIERS = (
     "view_json typed",
     "calibration",
     "images undistortion corner_table unknowns jacobian triangular schur leaving_out normal_equations subpix",
-    "corner_kernel compiled corner_grid corner_windows corner_fit corner_judgement corners",
+    "corner_kernel corner_grid corner_windows corner_fit corner_judgement corners",
     "quality photograph comparison projection_sigma information uncertainty hdf5 hdf5_calibration opencsp",
     "drawing board_file",
     "synthetic rendering resampling initial pose_fit flatness lens_fit free_board convergence dropping",
@@ -94,7 +94,7 @@ def loaded_by(statement: str) -> set[str]:
     return set(result.stdout.split()[-400:]) | set(result.stdout.split())
 
 
-HEAVY = {"cv2", "matplotlib", "nicegui", "fastapi", "pycolmap", "mrcal", "numba", "pypylon", "distributed", "h5py"}
+HEAVY = {"cv2", "matplotlib", "nicegui", "fastapi", "pycolmap", "mrcal", "pypylon", "distributed", "h5py"}
 
 
 @pytest.mark.parametrize(

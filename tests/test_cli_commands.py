@@ -106,7 +106,7 @@ def test_help_is_quick_as_it_loads_nothing_that_it_does_not_need() -> None:
     assert "Solving:" in result.stdout
     loaded = set(re.findall(r"\| +(\w+)", result.stderr))
     assert "typer" in loaded
-    assert not loaded & {"numpy", "scipy", "cv2", "matplotlib", "h5py", "numba", "rich", "nicegui", "distributed"}
+    assert not loaded & {"numpy", "scipy", "cv2", "matplotlib", "h5py", "rich", "nicegui", "distributed"}
 
 
 def test_no_command_at_all_is_answered_with_the_help() -> None:

@@ -1,7 +1,6 @@
 """Rendered photographs are true: edges and corners by OpenCV's projection, light by brute force and by statistics."""
 
 from collections.abc import Callable
-from types import FunctionType
 
 import cv2
 import numpy as np
@@ -11,7 +10,6 @@ from scipy.interpolate import RectBivariateSpline
 
 from opencsp_calib import Camera, CharucoBoard, Checkerboard, Image, InputError, Pose
 from opencsp_calib.rendering import Exposure, Scene, Spot, render
-from opencsp_calib.rendering.compiled import compiled
 from opencsp_calib.rendering.surface import look_up
 from opencsp_calib.synthetic import bowed, demo_camera, pose_in_view, random_poses, seed_poses
 
@@ -290,8 +288,3 @@ def test_what_cannot_be_rendered() -> None:
         Exposure(psf_px=-1.0)
     with pytest.raises(InputError, match="must not be negative"):
         Exposure(noise=-1.0)
-
-
-def test_loops_are_compiled_where_nothing_can_be_kept_on_disk() -> None:
-    nowhere = compile("def twice(x):\n    return 2.0 * x", "<no file>", "exec").co_consts[0]
-    assert compiled(FunctionType(nowhere, {}))(2.0) == 4.0

@@ -6,8 +6,8 @@ part alone notice more than 85 %.
 Way: mutmut's operators (another number, comparison, operator, word, argument) list every change in
 a function; a sample of 40 of each part (or as many as the argument says; seeded) is drawn, each is made alone in a copy
 of the project, and the tests of its part are run. A test that fails, and one that does not end in time, has noticed.
-mutmut's own runner is not used: it wraps each function, which Numba cannot compile. Here, the kernel is compiled for
-each change. Survivors are shown, those that make no difference included.
+mutmut's own runner is not used: it knows no parts. What is written in C is not changed. Survivors are shown, those that
+make no difference included.
 """
 
 import difflib
@@ -27,7 +27,7 @@ from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_repla
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).resolve().parents[1]
-COPIED = ("opencsp_calib", "plugins", "tests", "docs", "validation", "pyproject.toml", "README.md")
+COPIED = ("opencsp_calib", "plugins", "tests", "docs", "native", "validation", "pyproject.toml", "README.md")
 SEED = 20261128
 
 
@@ -45,11 +45,7 @@ PARTS = (
     Part(
         "corners",
         # not corner_table.py, which is the solvers'
-        (
-            "corners.py",
-            *(f"corner_{what}.py" for what in ("fit", "grid", "judgement", "windows")),
-            "corner_kernel/*.py",
-        ),
+        ("corners.py", *(f"corner_{what}.py" for what in ("fit", "grid", "judgement", "windows", "kernel"))),
         ("test_corner_grid", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
     ),
     Part("hdf5", ("hdf5*.py",), ("test_hdf5", "test_hdf5_damage")),

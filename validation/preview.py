@@ -29,7 +29,6 @@ from threadpoolctl import threadpool_limits
 
 from opencsp_calib import Checkerboard, Pose
 from opencsp_calib.capture import Capture, CaptureFolder, release_from
-from opencsp_calib.corners import prepare
 from opencsp_calib.looking import Search
 from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.registry import installed
@@ -103,7 +102,6 @@ def measured(poses, release):
 
 def main():
     """All scenes."""
-    prepare()
     print("| scene | frames a second | latency, median ms | 95 % ms | processor ms a frame |\n|---|---|---|---|---|")
     with threadpool_limits(1), opencv_on_one_thread():
         for name, (poses, release) in SCENES.items():

@@ -105,7 +105,7 @@ def print_versions() -> None:
     from opencsp_calib.registry import installed
 
     typer.echo(f"opencsp-calib {version('opencsp-calib')}, Python {platform.python_version()}, {platform.platform()}")
-    typer.echo(", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py", "numba")))
+    typer.echo(", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "h5py")))
     for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
         origin = f"{point.dist.name} {point.dist.version}" if point.dist else point.value
         typer.echo(f"plugin {point.name}: {origin}")

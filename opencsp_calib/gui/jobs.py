@@ -49,10 +49,8 @@ def _load() -> None:
     if hasattr(os, "nice"):
         os.nice(10)
     from opencsp_calib import pipeline  # noqa: F401
-    from opencsp_calib.corners import prepare
     from opencsp_calib.registry import installed
 
-    prepare()
     for solver in installed().solvers.values():
         solver.missing()
 

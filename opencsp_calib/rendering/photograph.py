@@ -12,7 +12,7 @@ from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
 from opencsp_calib.pose import Pose
 from opencsp_calib.rendering.blur import pixel_response
-from opencsp_calib.rendering.kernels import light_of
+from opencsp_calib.rendering.kernel import light_of
 from opencsp_calib.rendering.scene import Exposure, Scene, Spot, room
 from opencsp_calib.rendering.surface import look_up
 

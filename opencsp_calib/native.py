@@ -1,0 +1,65 @@
+"""The compiled part of opencsp-calib: loops over pixels, written in C and compiled when it is installed.
+
+Its sources are in the folder `native` beside the package. Calls let other threads run meanwhile.
+"""
+
+import ctypes
+import sys
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from opencsp_calib.errors import MissingDependencyError
+
+__all__ = ["array_of", "native_function", "result_of"]
+
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+def native_function(name: str, *arguments: Any) -> Callable[..., None]:
+    """A function of the compiled part, in the quickest form that this processor can run.
+
+    Parameters
+    ----------
+    name : str
+    *arguments : ctypes type, `array_of` or `result_of`
+        What it takes; a call with anything else is a TypeError.
+
+    Raises
+    ------
+    MissingDependencyError
+        If the compiled part is not there.
+    """
+    function = getattr(_library(), name)
+    function.argtypes, function.restype = arguments, None
+    made: Callable[..., None] = function
+    return made
+
+
+def array_of(dtype: type[np.generic], dimensions: int) -> Any:
+    """An array that is read: its numbers lie one after another, the last axis fastest."""
+    return np.ctypeslib.ndpointer(dtype, dimensions, flags="C_CONTIGUOUS")
+
+
+def result_of(dtype: type[np.generic], dimensions: int) -> Any:
+    """An array that is written to, in the same order."""
+    return np.ctypeslib.ndpointer(dtype, dimensions, flags=("C_CONTIGUOUS", "WRITEABLE"))
+
+
+@cache
+def _library() -> ctypes.CDLL:
+    plain = _load("")
+    return _load("_avx2") if plain.has_avx2() else plain
+
+
+def _load(variant: str) -> ctypes.CDLL:
+    file = Path(__file__).with_name(f"_native{variant}{SUFFIX}")
+    try:
+        return ctypes.CDLL(str(file))
+    except OSError as error:
+        raise MissingDependencyError(
+            f"the compiled part of opencsp-calib cannot be loaded ({error}): install opencsp-calib again with pip"
+        ) from None
