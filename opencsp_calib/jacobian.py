@@ -56,9 +56,9 @@ class ViewRows:
         """(2, 6, n)."""
         return self.values[:, -POSE:]
 
-    def corner_pose(self) -> Floats:
-        """(3, 6, n) products of each corner's shift with the pose: the blocks of JᵀJ that tie the two."""
-        return np.asarray(np.einsum("ain,apn->ipn", self.corner, self.pose))
+    def pose_corner(self) -> Floats:
+        """(6, 3, n) products of the pose with each corner's shift: the blocks of JᵀJ that tie the two."""
+        return np.asarray(np.einsum("apn,ain->pin", self.pose, self.corner))
 
 
 def residuals(lens: LensModel, table: CornerTable, estimate: Estimate) -> Floats:

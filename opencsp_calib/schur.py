@@ -26,7 +26,7 @@ from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["CornersKept", "Factorisation", "PosesKept", "factorise"]
 
-STRIP = 256  # rows of a product made at once
+STRIP = 256  # rows of a product made at once: the whole would be as large as the matrix that it is for
 TOGETHER = 32  # views whose poses are eliminated at once: matrices large enough for BLAS
 
 
@@ -64,14 +64,9 @@ class Factorisation(ABC):
         cameras = basis.shape[1]
         return np.asarray(basis @ self.shared_covariance[:cameras, :cameras] @ basis.T)
 
+    @abstractmethod
     def newton_step(self) -> Parts:
         """By how much the unknowns move to where the sum of squares is least, as far as it is a quadratic form."""
-        shared, corner, pose = self.solve(self.equations.gradient)
-        return -shared, -corner, -pose
-
-    @abstractmethod
-    def solve(self, right: Parts) -> Parts:
-        """The solution for a right-hand side."""
 
     @abstractmethod
     def solve_without_poses(self, right: Floats) -> Floats:
@@ -126,15 +121,15 @@ class PosesKept(Factorisation):
         ties = equations.shared_pose.transpose(0, 2, 1).reshape(poses, -1)
         shared = _damped(equations.shared.sum(axis=0), damping)
         reduced = np.block([[_block_diagonal(_damped(equations.pose, damping)), ties], [ties.T, shared]])
-        reduced -= sum(part @ part.T for part in coupling)
+        for part in coupling:
+            _add_lower(reduced, -part.T, part.T)
         return cls(equations, inverse_roots, *_scaled_root(reduced, equations.gauge()[1].reshape(poses, -1)), coupling)
 
-    def solve(self, right: Parts) -> Parts:
-        """See `Factorisation.solve`."""
-        shared, corner, pose = right
-        dense, inner = self._solved(np.concatenate([pose.ravel(), shared]), corner.T)
-        poses = pose.size
-        return dense[poses:], inner.T, dense[:poses].reshape(pose.shape)
+    def newton_step(self) -> Parts:
+        """See `Factorisation.newton_step`."""
+        shared, corner, pose = self.equations.gradient
+        dense, inner = self._solved(-np.concatenate([pose.ravel(), shared]), -corner.T)
+        return dense[pose.size :], inner.T, dense[: pose.size].reshape(pose.shape)
 
     def solve_without_poses(self, right: Floats) -> Floats:
         """See `Factorisation.solve_without_poses`."""
@@ -155,7 +150,15 @@ class PosesKept(Factorisation):
 
 @dataclass(frozen=True, eq=False)
 class CornersKept(Factorisation):
-    """Poses eliminated one by one: where the board is flat, or there are more views than corners."""
+    """Poses eliminated one by one: where the board is flat, or there are more views than corners.
+
+    Parameters
+    ----------
+    gradient : (3 C + M,)
+        Of what is kept, the poses eliminated: made along with the matrix, from the same rows of J.
+    """
+
+    gradient: Floats
 
     @classmethod
     def of(cls, equations: NormalEquations, damping: float) -> "CornersKept":
@@ -166,55 +169,45 @@ class CornersKept(Factorisation):
         reduced = np.zeros((corners + equations.unknowns.shared,) * 2)
         for row, column in np.ndindex(CORNER, CORNER):
             reduced[row * len(every) + every, column * len(every) + every] = blocks[:, row, column]
-        ties = equations.by_corner[:, CORNER:-1].transpose(0, 2, 1).reshape(corners, equations.unknowns.shared)
-        reduced[:corners, corners:], reduced[corners:, :corners] = ties, ties.T
+        ties = equations.by_corner[:, CORNER:-1].swapaxes(0, 1)
+        reduced[corners:, :corners] = ties.reshape(len(ties), corners)
         reduced[corners:, corners:] = _damped(equations.shared.sum(axis=0), damping)
-        for coupling in _couplings(equations, inverse_roots):
-            for first in range(0, coupling.shape[1], STRIP):  # the whole product would be as large as what it is for
-                strip = slice(first, first + STRIP)
-                reduced[strip] -= coupling[:, strip].T @ coupling
+        gradient = np.concatenate([equations.corner_gradient.T.ravel(), equations.shared_gradient.sum(axis=0)])
+        alone = inverse_roots @ equations.pose_gradient[:, :, None]
+        for views, coupling in _couplings(equations, inverse_roots):
+            _add_lower(reduced, -coupling, coupling)
+            gradient -= alone[views].ravel() @ coupling
         gauge = equations.gauge()[0].transpose(1, 0, 2).reshape(corners, 7)
-        return cls(equations, inverse_roots, *_scaled_root(reduced, gauge))
+        return cls(equations, inverse_roots, *_scaled_root(reduced, gauge), gradient)
 
-    def solve(self, right: Parts) -> Parts:
-        """See `Factorisation.solve`."""
-        shared, corner, pose = right
-        equations, corners = self.equations, corner.T.copy()
-        alone = self._poses(pose)
-        for rows in equations.rows():
-            corners[:, rows.columns] -= (rows.corner * (alone[rows.view] @ rows.pose)[:, None]).sum(axis=0)
-        shared = shared - (equations.shared_pose @ alone[:, :, None]).sum(axis=0)[:, 0]
-        dense = self._dense(np.concatenate([corners.ravel(), shared]))
-        corners, shared = dense[: corner.size].reshape(corners.shape), dense[corner.size :]
-        pose = pose - shared @ equations.shared_pose
+    def newton_step(self) -> Parts:
+        """See `Factorisation.newton_step`."""
+        equations, roots = self.equations, self.inverse_roots
+        corners, shared = np.split(self._dense(-self.gradient), [equations.corner_gradient.size])
+        corners = corners.reshape(CORNER, len(equations.corner))
+        pose = -equations.pose_gradient - shared @ equations.shared_pose
         for rows in equations.rows():
             moved = (rows.corner * corners[:, rows.columns]).sum(axis=1)
             pose[rows.view] -= (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
-        return shared, corners.T, self._poses(pose)
+        return shared, corners.T, (roots.transpose(0, 2, 1) @ (roots @ pose[:, :, None]))[:, :, 0]
 
     def solve_without_poses(self, right: Floats) -> Floats:
         """See `Factorisation.solve_without_poses`."""
         shared = self.equations.unknowns.shared
         return np.roll(self._dense(np.roll(right, -shared, axis=0)), shared, axis=0)
 
-    def _poses(self, right: Floats) -> Floats:
-        """(V, 6) solutions with the poses' own blocks alone."""
-        roots = self.inverse_roots
-        return np.asarray((roots.transpose(0, 2, 1) @ (roots @ right[:, :, None]))[:, :, 0])
 
-
-def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[Matrix]:
-    """(6 n, 3 C + M) what ties n poses to corners and shared unknowns, multiplied by the poses' inverse roots."""
+def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[tuple[slice, Matrix]]:
+    """Runs of n views, and (6 n, 3 C + M) what ties their poses to the rest, multiplied by the poses' inverse roots."""
     views, corners = len(inverse_roots), len(equations.corner)
     for begin in range(0, views, TOGETHER):
-        end = min(begin + TOGETHER, views)
-        ties = np.zeros((end - begin, POSE, CORNER, corners))
-        for rows in equations.rows(begin, end):
-            ties[rows.view - begin][:, :, rows.columns] = rows.corner_pose().transpose(1, 0, 2)
-        shared = equations.shared_pose[begin:end].transpose(0, 2, 1)
-        ties = np.concatenate([ties.reshape(len(shared), POSE, CORNER * corners), shared], axis=2)
-        coupling = inverse_roots[begin:end] @ ties
-        yield coupling.reshape(-1, coupling.shape[2])
+        run = slice(begin, min(begin + TOGETHER, views))
+        ties = np.zeros((run.stop - begin, POSE, CORNER * corners + equations.unknowns.shared))
+        ties[:, :, CORNER * corners :] = equations.shared_pose[run].transpose(0, 2, 1)
+        blocks = ties[:, :, : CORNER * corners].reshape(len(ties), POSE, CORNER, corners)
+        for rows in equations.rows(begin, run.stop):
+            blocks[rows.view - begin][:, :, rows.columns] = rows.pose_corner()
+        yield run, (inverse_roots[run] @ ties).reshape(-1, ties.shape[2])
 
 
 def _damped(blocks: Floats, damping: float) -> Floats:
@@ -229,10 +222,20 @@ def _block_diagonal(blocks: Floats) -> Matrix:
     return matrix.reshape(count * size, count * size)
 
 
+def _add_lower(matrix: Matrix, left: Matrix, right: Matrix) -> None:
+    """Add the product leftᵀ right (k, k) of two matrices (n, k) to another one's lower triangle: half of the work.
+
+    Above the diagonal some of it is added, too.
+    """
+    for first in range(0, len(matrix), STRIP):
+        strip = slice(first, min(first + STRIP, len(matrix)))
+        matrix[strip, : strip.stop] += left[:, strip].T @ right[:, : strip.stop]
+
+
 def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     """Scale and lower Cholesky factor of a dense matrix, with the gauge's projector added; see `Factorisation`.
 
-    The matrix is overwritten, as by `CholeskyRoot.of`.
+    Of the matrix, which is overwritten as by `CholeskyRoot.of`, nothing but the lower triangle counts.
     """
     diagonal = np.diag(dense)
     if not (diagonal > 0).all():
@@ -242,5 +245,5 @@ def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     dense *= scale
     if gauge.any():
         free, _ = np.linalg.qr(gauge / scale[: len(gauge), None])
-        dense[: len(gauge), : len(gauge)] += free @ free.T
+        _add_lower(dense[: len(gauge), : len(gauge)], free.T, free.T)
     return scale, CholeskyRoot.of(dense)

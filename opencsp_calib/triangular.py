@@ -33,6 +33,8 @@ class CholeskyRoot:
     def of(cls, matrix: Matrix) -> "CholeskyRoot":
         """The root of a positive definite matrix (n, n), left in its place: it may be the largest thing in memory.
 
+        Nothing but the lower triangle is read.
+
         Raises
         ------
         numpy.linalg.LinAlgError

@@ -93,7 +93,7 @@ class Dense:
         for rows in equations.rows():
             columns = m + 3 * np.arange((end - m) // 3)[rows.columns][:, None] + np.arange(3)
             poses = end + 6 * rows.view + np.arange(6)
-            matrix[poses[:, None, None], columns] = rows.corner_pose().transpose(1, 2, 0)
+            matrix[poses[:, None, None], columns] = rows.pose_corner().transpose(0, 2, 1)
         return np.tril(matrix) + np.tril(matrix, -1).T
 
     def gradient(self, equations: NormalEquations) -> np.ndarray:
@@ -114,8 +114,7 @@ def at_minimum(dense: Dense) -> NormalEquations:
     estimate = Estimate.of(c)
     for _ in range(8):
         equations = linearise(c.camera.lens, table, estimate, unknowns)
-        step = factorise(equations).solve(equations.gradient)
-        estimate = estimate.moved(unknowns, *(-part for part in step))
+        estimate = estimate.moved(unknowns, *factorise(equations).newton_step())
     return linearise(c.camera.lens, table, estimate, unknowns)
 
 
@@ -151,11 +150,9 @@ def test_blocks_of_lens_models(model):
 def test_solution_and_covariance_are_those_of_the_dense_pseudo_inverse(shape, aspect, views):
     dense = Dense(world(views, SolveOptions(board_shape=shape, pixel_aspect=aspect)))
     matrix, right = dense.matrix(dense.equations), dense.gradient(dense.equations)
-    m, end = dense.parts
     factor = factorise(dense.equations)
     assert isinstance(factor, PosesKept if shape == "free" and views == 5 else CornersKept)
-    parts = right[:m], right[m:end].reshape(-1, 3), right[end:].reshape(-1, 6)
-    solution = np.concatenate([part.ravel() for part in factor.solve(parts)])
+    solution = -np.concatenate([part.ravel() for part in factor.newton_step()])
     scale = np.sqrt(np.diag(matrix))
     assert np.abs((matrix @ solution - right) / scale).max() < 1e-9 * np.abs(right / scale).max()
     basis = dense.unknowns.camera
@@ -352,5 +349,5 @@ def test_rows_that_are_made_again_are_those_that_would_have_been_kept(views, mon
     for one, other in zip(kept.rows(1, views), again.rows(1, views), strict=True):
         assert one.view == other.view
         np.testing.assert_array_equal(one.values, other.values)
-    for one, other in zip(*(factorise(e).solve(e.gradient) for e in (kept, again)), strict=True):
+    for one, other in zip(*(factorise(e).newton_step() for e in (kept, again)), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-9)

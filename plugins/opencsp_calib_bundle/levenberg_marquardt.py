@@ -12,13 +12,13 @@ import numpy as np
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
 from opencsp_calib.normal_equations import NormalEquations, Parts, linearise, well_conditioned
-from opencsp_calib.schur import factorise
+from opencsp_calib.schur import Factorisation, factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
 from opencsp_calib_bundle.extrapolation import extrapolated
 
 __all__ = ["Minimum", "minimise"]
 
-ROUGHLY = 1e-4
+ROUGHLY = 1e-2
 """Tolerance that leaves less than a hundredth of the residuals' norm to gain: enough between two weightings."""
 NEAR = 1e-8
 """Tolerance as far as unknowns that can hardly be told apart are worth keeping apart."""
@@ -45,19 +45,23 @@ class Minimum:
     equations : NormalEquations
         At the estimate, or so near that they do not differ.
     converged : bool
+    factor : Factorisation, optional
+        Of the equations; None where there is none that is not damped.
     """
 
     estimate: Estimate
     equations: NormalEquations
     converged: bool
+    factor: Factorisation | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """A step of the unknowns, and how much it promises to lower the cost."""
+    """A step of the unknowns, how much it promises to lower the cost, and the factored matrix it comes from."""
 
     parts: Parts
     promised: float
+    factor: Factorisation
 
 
 def minimise(
@@ -111,7 +115,7 @@ def _along_valley(lens: LensModel, table: CornerTable, start: Estimate, equation
             break
         if step.promised < least:
             least = step.promised
-            best = Minimum(estimate, equations, converged=least <= TO_THE_END * equations.cost)
+            best = Minimum(estimate, equations, least <= TO_THE_END * equations.cost, step.factor)
         if best.converged:
             break
         steps.append(np.concatenate([part.ravel() for part in step.parts]))
@@ -146,7 +150,8 @@ def _descended(
         slack = rounding * (2.0 * equations.cost**0.5 + rounding)  # of the cost; below it gains cannot be seen
         least = polishes > POLISHES or (step and step.promised <= max(tolerance * equations.cost, rounding**2))
         if step and least and damping <= FIRST_DAMPING:
-            return Minimum(estimate.moved(equations.unknowns, *step.parts), equations, converged=True)
+            end = estimate.moved(equations.unknowns, *step.parts)
+            return Minimum(end, equations, True, step.factor if damping <= LEAST_DAMPING else None)
         there = _after(lens, table, estimate, equations.unknowns, step) if step else None
         if step is None or there is None or not there[1].cost <= equations.cost + slack:  # NaN is not
             damping, growth, fall = damping * growth, growth * 2.0, 0.3
@@ -158,18 +163,19 @@ def _descended(
         polishes += step.promised <= slack
         damping, growth = max(damping * max(fall, 1.0 - (2.0 * kept - 1.0) ** 3), LEAST_DAMPING), GROWTH
     last = _step(equations, LEAST_DAMPING)
-    return Minimum(estimate, equations, converged=last is not None and last.promised <= ENOUGH * equations.cost)
+    if last is None:
+        return Minimum(estimate, equations, converged=False)
+    return Minimum(estimate, equations, last.promised <= ENOUGH * equations.cost, last.factor)
 
 
 def _step(equations: NormalEquations, damping: float) -> _Step | None:
     """None where the damped matrix is still singular."""
-    shared, corner, pose = equations.gradient
-    right = -shared, -corner, -pose
     try:
-        parts = factorise(equations, damping).solve(right)
+        factor = factorise(equations, damping)
     except np.linalg.LinAlgError:
         return None
-    return _Step(parts, float(sum((a * b).sum() for a, b in zip(right, parts, strict=True))))
+    parts = factor.newton_step()
+    return _Step(parts, -float(sum((a * b).sum() for a, b in zip(equations.gradient, parts, strict=True))), factor)
 
 
 def _after(

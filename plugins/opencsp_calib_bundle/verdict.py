@@ -43,7 +43,7 @@ def checked_covariance(
             f"{options.board_shape} board: take more views"
         )
     try:
-        information = factorise(equations).camera_covariance
+        information = (minimum.factor or factorise(equations)).camera_covariance
     except np.linalg.LinAlgError:
         information = np.full((len(lens.parameter_names),) * 2, np.inf)
     floor = LEAST_SIGMA_PX * typical_weight
