@@ -14,6 +14,7 @@ from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import InputError
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
+from opencsp_calib.rotations import rotation_matrices
 
 __all__ = ["LEAST_VIEWS", "Calibration", "Solve"]
 
@@ -116,9 +117,10 @@ class Calibration:
         return replace(self, problems=self.problems + problems)
 
     def _computed_residuals(self) -> tuple[Floats, ...]:
+        turns = rotation_matrices(np.array([pose.rotation for pose in self.cam_from_board]).reshape(-1, 3))
         return tuple(
-            self.camera.project(pose.transform(self.board.points[d.ids])) - d.pixels
-            for pose, d in zip(self.cam_from_board, self.observations.detections, strict=True)
+            self.camera.project(self.board.points[d.ids] @ turn.T + pose.translation) - d.pixels
+            for turn, pose, d in zip(turns, self.cam_from_board, self.observations.detections, strict=True)
         )
 
 

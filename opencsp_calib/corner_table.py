@@ -26,8 +26,8 @@ class CornerTable:
     first : (V + 1,) int
         Corners ``first[v]`` to ``first[v + 1]`` are of view v.
     whitening : (N, 2, 2), optional
-        What residuals are multiplied by before they are squared: W with WᵀW the inverse of the corner's covariance;
-        None for the identity.
+        What residuals are multiplied by before they are squared: lower triangular W with WᵀW the inverse of the
+        corner's covariance; None for the identity.
     """
 
     ids: Ids
@@ -94,10 +94,14 @@ class CornerTable:
         if len(self) <= count:
             return self
         wanted = np.maximum(LEAST, count / len(self) * self.counts)
-        order = np.lexsort([np.random.default_rng(len(self)).random(len(self)), self.view])
+        order = np.argsort(self.view + np.random.default_rng(len(self)).random(len(self)))
         mask = np.empty(len(self), dtype=np.bool_)
         mask[order] = np.arange(len(self)) - self.first[self.view] < wanted[self.view]
         return self.keeping(mask)
+
+    def whitened(self, residuals: Floats) -> Floats:
+        """Residuals (N, 2) px over the standard deviations of the corners."""
+        return residuals if self.whitening is None else np.einsum("nij,nj->ni", self.whitening, residuals)
 
     def weighted(self, factor: Floats) -> "CornerTable":
         """The same with each corner's whitened residual multiplied by a factor (N,)."""

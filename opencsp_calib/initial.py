@@ -18,6 +18,7 @@ from opencsp_calib.detection import Detection, Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.models import LensModel, lens_model
 from opencsp_calib.pose import Pose
+from opencsp_calib.rotations import rotation_vectors
 
 __all__ = ["initial_camera", "initial_poses", "rough_tilts"]
 
@@ -73,7 +74,7 @@ def initial_poses(camera: Camera, observations: Observations) -> tuple[Pose, ...
     """
     search = _PoseSearch(observations.board.points, observations.detections, CORNERS)
     rotations, translations = search.poses(camera.lens, camera.params)
-    return tuple(Pose.from_matrix(r, t) for r, t in zip(rotations, translations, strict=True))
+    return tuple(Pose(r, t) for r, t in zip(rotation_vectors(rotations), translations, strict=True))
 
 
 def rough_tilts(observations: Observations) -> dict[str, float]:

@@ -123,13 +123,13 @@ def _fill(
     points = turned + _shifts(table, estimate, views)
     pixels, by_point, by_params = lens.project_with_jacobians(points.T, estimate.params)
     whitening = None if table.whitening is None else np.ascontiguousarray(table.whitening[span].transpose(1, 2, 0))
-    by_shift = _whitened(whitening, by_point.transpose(1, 2, 0))
     rows = values[:, skipped:]
-    rows[:, :cameras] = unknowns.camera.T @ _whitened(whitening, by_params.transpose(1, 2, 0))
-    rows[:, shared] = _whitened(whitening, (pixels - table.pixels[span]).T)
+    by_shift = rows[:, -CORNER:]
+    _whiten(whitening, by_point.transpose(1, 2, 0), by_shift)
+    _whiten(whitening, _by_camera(by_params.transpose(1, 2, 0), unknowns), rows[:, :cameras])
+    _whiten(whitening, (pixels - table.pixels[span]).T, rows[:, shared])
     for axis, (one, two) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[:, shared + 1 + axis] = turned[one] * by_shift[:, two] - turned[two] * by_shift[:, one]
-    rows[:, -3:] = by_shift
     if skipped or shared > cameras:
         by_board = np.empty_like(by_shift)
         for view in range(*views):
@@ -148,12 +148,21 @@ def split_by_view(table: CornerTable, unknowns: Unknowns, views: tuple[int, int]
         yield ViewRows(view, columns, values[:, :, table.span(view, view + 1, since=views[0])])
 
 
-def _whitened(whitening: Floats | None, rows: Floats) -> Floats:
-    """Rows (2, ..., n) multiplied by (2, 2, n)."""
+def _by_camera(by_params: Floats, unknowns: Unknowns) -> Floats:
+    """(2, Q, n) by the camera's unknowns, from (2, P, n) by its parameters: mostly the same."""
+    same = np.array_equal(unknowns.camera, np.eye(by_params.shape[1]))
+    return by_params if same else unknowns.camera.T @ by_params
+
+
+def _whiten(whitening: Floats | None, rows: Floats, out: Floats) -> None:
+    """Rows (2, ..., n) multiplied by lower triangular matrices (2, 2, n), put where they belong."""
     if whitening is None:
-        return rows
-    (a, b), (c, d) = whitening
-    return np.array([a * rows[0] + b * rows[1], c * rows[0] + d * rows[1]])
+        out[:] = rows
+        return
+    (a, _), (b, c) = whitening
+    np.multiply(a, rows[0], out=out[0])
+    np.multiply(b, rows[0], out=out[1])
+    out[1] += c * rows[1]
 
 
 def _turned(table: CornerTable, estimate: Estimate, views: tuple[int, int]) -> Points:

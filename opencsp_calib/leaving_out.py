@@ -1,5 +1,7 @@
 """How a camera moves when each view in turn is left out: one Newton step each, everything else solved again."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
@@ -12,7 +14,7 @@ __all__ = ["camera_without_each_view"]
 
 CG_TOLERANCE = 1e-6  # of each step's length in sigmas
 CG_STEPS = 200
-TOGETHER = 2**16  # numbers: as many views are left out at once as have so many unknowns
+TOGETHER = 2**15  # numbers: as many views are left out at once as have so many unknowns
 
 
 def camera_without_each_view(
@@ -84,8 +86,10 @@ def _without(
     is never needed. Both are singular in the directions of the gauge, which right-hand sides have no part in. Steps
     are counted from where the step `ahead` (M + 3 C,) leads.
     """
-    start_from = None if ahead is None else np.broadcast_to(ahead, (views[1] - views[0], len(ahead)))
-    right = _of_views(whole.equations, inverse_pose, views, start_from, residual=True)
+    equations, inverse_pose = whole.equations, inverse_pose[slice(*views)]
+    run = tuple(equations.rows(*views, together=True))
+    start_from = None if ahead is None else np.broadcast_to(ahead, (len(run), len(ahead)))
+    right = _of_views(equations, run, inverse_pose, start_from, residual=True)
     x, residual = np.zeros_like(right), right.copy()
     direction, whole_direction = np.zeros_like(right), np.zeros_like(right)
     before = np.ones(len(right))
@@ -100,7 +104,7 @@ def _without(
         factor = np.where(active, now / before, 0.0) if step else np.zeros_like(now)
         direction = preconditioned + factor[:, None] * direction
         whole_direction = residual + factor[:, None] * whole_direction
-        product = whole_direction - _of_views(whole.equations, inverse_pose, views, direction)
+        product = whole_direction - _of_views(equations, run, inverse_pose, direction)
         curvature = np.einsum("vi,vi->v", direction, product)
         length = np.divide(now, curvature, out=np.zeros_like(now), where=active & (curvature > 0))
         x += length[:, None] * direction
@@ -112,24 +116,24 @@ def _without(
 
 def _of_views(
     equations: NormalEquations,
+    run: Sequence[ViewRows],
     inverse_pose: Floats,
-    views: tuple[int, int],
     x: Floats | None,
     *,
     residual: bool = False,
 ) -> Floats:
     """(n, M + 3 C): each view's own matrix, its pose eliminated, times a vector of its own, or plus its gradient."""
     shared, corners = equations.unknowns.shared, len(equations.unknowns.corners)
-    products = np.zeros((views[1] - views[0], shared + CORNER * corners))
-    for rows in equations.rows(*views):
+    products = np.zeros((len(run), shared + CORNER * corners))
+    for index, rows in enumerate(run):
         moved = rows.residual if residual else np.zeros_like(rows.residual)
         if x is not None:
-            moved = moved + _moved(rows, x[rows.view - views[0]], shared)
+            moved = moved + _moved(rows, x[index], shared)
         turned = (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
-        moved = moved - (inverse_pose[rows.view] @ turned) @ rows.pose
-        product = products[rows.view - views[0]]
-        product[:shared] = (rows.shared @ moved[:, :, None]).sum(axis=0)[:, 0]
-        product[shared:].reshape(CORNER, corners)[:, rows.columns] = (rows.corner * moved[:, None]).sum(axis=0)
+        moved = moved - (inverse_pose[index] @ turned) @ rows.pose
+        products[index, :shared] = (rows.shared @ moved[:, :, None]).sum(axis=0)[:, 0]
+        of_corners = products[index, shared:].reshape(CORNER, corners)
+        of_corners[:, rows.columns] = (rows.corner * moved[:, None]).sum(axis=0)
     return products
 
 

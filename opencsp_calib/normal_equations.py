@@ -135,16 +135,20 @@ class NormalEquations:
         """By all unknowns."""
         return self.shared_gradient.sum(axis=0), self.corner_gradient, self.pose_gradient
 
-    def rows(self, begin: int = 0, end: int | None = None) -> Iterator[ViewRows]:
-        """Rows of J of the views from `begin` to before `end`; none where no corner is solved for."""
+    def rows(self, begin: int = 0, end: int | None = None, *, together: bool = False) -> Iterator[ViewRows]:
+        """Rows of J of the views from `begin` to before `end`; none where no corner is solved for.
+
+        Those of a view may be gone when the next ones are made, unless they are wanted `together`.
+        """
         end = len(self.dense) if end is None else end
         if not len(self.unknowns.corners):
             return
-        if self.kept_rows is None:
-            yield from rows_of_each_view(self.lens, self.table, self.estimate, self.unknowns, (begin, end))
-        else:
+        if self.kept_rows is not None:
             values = self.kept_rows[:, :, self.table.span(begin, end)]
             yield from split_by_view(self.table, self.unknowns, (begin, end), values)
+            return
+        room = _room(self.unknowns, self.table.counts[begin:end].sum()) if together else None
+        yield from rows_of_each_view(self.lens, self.table, self.estimate, self.unknowns, (begin, end), room)
 
     def keeping(self, views: slice) -> "NormalEquations":
         """Those of some of the views alone, linearised at the same place.
@@ -244,13 +248,18 @@ def linearise(lens: LensModel, table: CornerTable, estimate: Estimate, unknowns:
     shared, corners = unknowns.shared, len(unknowns.corners)
     dense = np.empty((len(table.first) - 1, shared + 1 + POSE, shared + 1 + POSE))
     by_corner = np.zeros((CORNER, CORNER + shared + 1, corners))
-    kept = np.empty((2, row_count(unknowns), len(table))) if corners and len(table) <= KEPT else None
+    kept = _room(unknowns, len(table)) if corners and len(table) <= KEPT else None
     for rows in rows_of_each_view(lens, table, estimate, unknowns, (0, len(dense)), kept):
         first, second = rows.values[:, CORNER if corners else 0 :]
         dense[rows.view] = first @ first.T + second @ second.T
         if corners:
             _add_by_corner(by_corner, rows)
     return NormalEquations(lens, table, estimate, unknowns, dense, by_corner, kept)
+
+
+def _room(unknowns: Unknowns, corners: int) -> Floats:
+    """Where rows of J go, not yet filled."""
+    return np.empty((2, row_count(unknowns), corners))
 
 
 def _add_by_corner(by_corner: Floats, rows: ViewRows) -> None:

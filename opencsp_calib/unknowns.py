@@ -1,5 +1,6 @@
 """What a calibration solves for, and the values it has reached."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,13 +38,14 @@ class Estimate:
     @classmethod
     def of(cls, calibration: Calibration) -> "Estimate":
         """A calibration's values."""
-        poses = calibration.cam_from_board
-        return cls(
-            calibration.camera.params,
-            rotation_matrices(np.array([p.rotation for p in poses]).reshape(-1, 3)),
-            np.array([p.translation for p in poses]).reshape(-1, 3),
-            calibration.board.points,
-        )
+        return cls.posed(calibration.camera.params, calibration.cam_from_board, calibration.board.points)
+
+    @classmethod
+    def posed(cls, params: Params, cam_from_board: Sequence[Pose], points: Points) -> "Estimate":
+        """With the poses of all views."""
+        turns = np.array([pose.rotation for pose in cam_from_board]).reshape(-1, 3)
+        shifts = np.array([pose.translation for pose in cam_from_board]).reshape(-1, 3)
+        return cls(params, rotation_matrices(turns), shifts, points)
 
     @property
     def poses(self) -> tuple[Pose, ...]:

@@ -72,8 +72,9 @@ class LensModel(ABC):
         by_params = np.zeros((2, len(params), len(points))).transpose(2, 0, 1)
         by_params[:, 0, 0], by_params[:, 1, 1] = plane[:, 0], plane[:, 1]
         by_params[:, 0, 2] = by_params[:, 1, 3] = 1.0
-        by_params[:, :, 4:] = by_distortion * params[:2, None]
-        return pixels, by_point * params[:2, None], by_params
+        np.multiply(by_distortion, params[:2, None], out=by_params[:, :, 4:])
+        by_point *= params[:2, None]
+        return pixels, by_point, by_params
 
     def unproject(self, pixels: Pixels, params: Params) -> Points:
         """Unit vectors of the rays that end in pixels, converged to `CONVERGED_PX`.

@@ -49,7 +49,8 @@ class OpenCVModel(LensModel):
 
     def _distorted(self, points: Points, distortion: Params) -> Floats:
         d = _padded(distortion)
-        return tilted(_bent(self._on_plane(points, distortion), d), tilt_matrix(d[12], d[13]))
+        bent = _bent(self._on_plane(points, distortion), d)
+        return tilted(bent, tilt_matrix(d[12], d[13])) if len(distortion) == len(NAMES) else bent
 
     def _distorted_with_jacobians(self, points: Points, distortion: Params) -> tuple[Floats, Floats, Floats]:
         d = _padded(distortion)
@@ -63,7 +64,7 @@ class OpenCVModel(LensModel):
             by_coefficients = by_bent @ by_coefficients
             by_coefficients[:, :, 12:] = by_tilt
         by_point = np.empty((2, 3, len(points))).transpose(2, 0, 1)
-        by_point[:, :, :2] = by_plane / points[:, 2, None, None]
+        np.divide(by_plane, points[:, 2, None, None], out=by_point[:, :, :2])
         by_point[:, :, 2] = -by_point[:, :, 0] * plane[:, :1] - by_point[:, :, 1] * plane[:, 1:]
         return bent, by_point, by_coefficients
 

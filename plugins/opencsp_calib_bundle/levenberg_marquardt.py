@@ -19,7 +19,8 @@ from opencsp_calib_bundle.extrapolation import extrapolated
 __all__ = ["Minimum", "minimise"]
 
 ROUGHLY = 1e-2
-"""Tolerance that leaves less than a hundredth of the residuals' norm to gain: enough between two weightings."""
+"""Tolerance after whose last step next to nothing is left to gain, Newton's steps being what they are: enough between
+two weightings."""
 NEAR = 1e-8
 """Tolerance as far as unknowns that can hardly be told apart are worth keeping apart."""
 TO_THE_END = 1e-16

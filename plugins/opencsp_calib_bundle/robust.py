@@ -39,8 +39,6 @@ def outlying(table: CornerTable, residuals: Floats) -> Mask:
 
 def _lengths(table: CornerTable, residuals: Floats) -> tuple[Floats, float]:
     """(N,) lengths of the whitened residuals, and the standard deviation per axis that their median tells of."""
-    if table.whitening is not None:
-        residuals = (table.whitening @ residuals[:, :, None])[:, :, 0]
-    lengths = np.hypot(residuals[:, 0], residuals[:, 1])
+    lengths = np.hypot(*table.whitened(residuals).T)
     lengths[np.isnan(lengths)] = np.inf
     return lengths, max(float(np.median(lengths)) / MEDIAN_LENGTH, SMALLEST_PX * table.typical_weight)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opencsp_calib import CalibrationFailedError, Camera, Observations, Pose, SolveOptions
+from opencsp_calib import CalibrationFailedError, Camera, Observations, SolveOptions
 from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.initial import initial_camera, initial_poses
@@ -24,13 +24,17 @@ def start(observations: Observations, model: str, options: SolveOptions) -> Esti
     CalibrationFailedError
         If no pose of a view puts its corners before the camera.
     """
+
+    def posed(camera: Camera) -> Estimate:
+        return Estimate.posed(camera.params, initial_poses(camera, observations), observations.board.points)
+
     camera = initial_camera(observations, model, options.guess, options.pixel_aspect)
     table = CornerTable.of(observations.detections)
-    estimate = _posed(camera, observations)
+    estimate = posed(camera)
     if np.isnan(residuals(camera.lens, table, estimate)).any() and camera.distortion.any():
         # the guess's distortion folds back before the outermost corners: its other numbers may still serve
         camera = Camera(camera.name, model, np.r_[camera.params[:4], 0.0 * camera.distortion], camera.image_size)
-        estimate = _posed(camera, observations)
+        estimate = posed(camera)
     lost = np.isnan(residuals(camera.lens, table, estimate)).any(axis=1)
     if lost.any():
         image = observations.used[int(table.view[lost][0])].image
@@ -61,16 +65,6 @@ def with_deeper_minima(observations: Observations, camera: Camera, estimate: Est
         np.where(deeper[:, None, None], rotations, estimate.rotations),
         np.where(deeper[:, None], translations, estimate.translations),
         estimate.points,
-    )
-
-
-def _posed(camera: Camera, observations: Observations) -> Estimate:
-    poses: tuple[Pose, ...] = initial_poses(camera, observations)
-    return Estimate(
-        camera.params,
-        np.array([pose.matrix for pose in poses]),
-        np.array([pose.translation for pose in poses]),
-        observations.board.points,
     )
 
 
