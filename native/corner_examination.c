@@ -6,16 +6,21 @@
 
 /* How hard each edge's bend pulls at each parameter: its derivative's products with the others. */
 static void pull(const double *p, const Window *window, double pulls[PARAMETERS][2]) {
-    double x1 = cos(p[ANGLE_1]), y1 = sin(p[ANGLE_1]), x2 = cos(p[ANGLE_2]), y2 = sin(p[ANGLE_2]);
-    const double *by_angle1 = window->column[ANGLE_1], *by_angle2 = window->column[ANGLE_2];
+    float x1 = (float)cos(p[ANGLE_1]), y1 = (float)sin(p[ANGLE_1]);
+    float x2 = (float)cos(p[ANGLE_2]), y2 = (float)sin(p[ANGLE_2]);
+    float by_bend1[MOST_PIXELS], by_bend2[MOST_PIXELS];
+    for (int k = 0; k < window->count; k++) {
+        float x = window->x[k], y = window->y[k];
+        by_bend1[k] = 0.5f * window->column[ANGLE_1][k] * (x * x1 + y * y1);
+        by_bend2[k] = 0.5f * window->column[ANGLE_2][k] * (x * x2 + y * y2);
+    }
     for (int i = 0; i < PARAMETERS; i++) {
-        double pull1 = 0.0, pull2 = 0.0;
+        float pull1 = 0, pull2 = 0;
         for (int k = 0; k < window->count; k++) {
-            double x = window->x[k], y = window->y[k], by = window->column[i][k];
-            pull1 += by * by_angle1[k] * (x * x1 + y * y1);
-            pull2 += by * by_angle2[k] * (x * x2 + y * y2);
+            pull1 += window->column[i][k] * by_bend1[k];
+            pull2 += window->column[i][k] * by_bend2[k];
         }
-        pulls[i][0] = 0.5 * pull1, pulls[i][1] = 0.5 * pull2;
+        pulls[i][0] = pull1, pulls[i][1] = pull2;
     }
 }
 
@@ -36,29 +41,33 @@ void examine_place(const double *p, const Window *window, Factor factor, double 
 
 /* Each quarter's mean residual, over the amplitude, and its share of saturated pixels. */
 void examine_quarters(const double *p, const Window *window, double white, double *found) {
-    double x1 = cos(p[ANGLE_1]), y1 = sin(p[ANGLE_1]), x2 = cos(p[ANGLE_2]), y2 = sin(p[ANGLE_2]);
-    double total = 0.0, weights = 0.0;
+    float x1 = (float)cos(p[ANGLE_1]), y1 = (float)sin(p[ANGLE_1]);
+    float x2 = (float)cos(p[ANGLE_2]), y2 = (float)sin(p[ANGLE_2]), saturated = (float)white, total = 0;
+    float misfit[4] = {0}, saturation[4] = {0}, weight[4] = {0};
     for (int k = 0; k < window->count; k++) {
-        double x = window->x[k], y = window->y[k];
-        double root = window->column[ROOT][k], residual = window->column[RESIDUAL][k];
-        int quarter = 2 * (y * x1 > x * y1) + (y * x2 > x * y2);
+        float x = window->x[k], y = window->y[k], root = window->column[ROOT][k], residual = window->column[RESIDUAL][k];
+        int side1 = y * x1 > x * y1, side2 = y * x2 > x * y2, bright = window->level[k] >= saturated;
         total += residual * residual;
-        weights += root * root;
-        found[MISFIT + quarter] += root * residual;
-        found[SATURATION + quarter] += window->level[k] >= white ? root * root : 0.0;
-        found[WEIGHT + quarter] += root * root;
+        for (int quarter = 0; quarter < 4; quarter++) {
+            float part = side1 == quarter / 2 && side2 == quarter % 2 ? root : 0;
+            misfit[quarter] += part * residual;
+            saturation[quarter] += bright ? part * part : 0;
+            weight[quarter] += part * part;
+        }
     }
     for (int quarter = 0; quarter < 4; quarter++) {
-        found[MISFIT + quarter] /= greater(found[WEIGHT + quarter], 1.0) * greater(fabs(p[B]), 1e-9);
-        found[SATURATION + quarter] /= greater(found[WEIGHT + quarter], 1.0);
+        double pixels = greater(weight[quarter], 1.0);
+        found[MISFIT + quarter] = misfit[quarter] / (pixels * greater(fabs(p[B]), 1e-9));
+        found[SATURATION + quarter] = saturation[quarter] / pixels;
+        found[WEIGHT + quarter] = weight[quarter];
     }
-    found[VARIANCE] = total / greater(weights - PARAMETERS, 1.0);
+    found[VARIANCE] = total / greater(weight[0] + weight[1] + weight[2] + weight[3] - PARAMETERS, 1.0);
 }
 
 /* The residuals, laid out as they are in the image, the corner in the middle; what is not a number has no residual. */
 enum { SIDE = 72 }; /* windows reach 29.5 px from the corner, and their opposite a pixel farther */
 typedef struct {
-    double residual[SIDE][SIDE];
+    float residual[SIDE][SIDE];
     int64_t first_row, last_row, first_column, last_column;
 } Picture;
 
@@ -91,26 +100,27 @@ static void lay_out(const double *p, const Window *window, Picture *picture) {
 void examine_opposites(const double *p, const Window *window, double *found) {
     Picture picture;
     lay_out(p, window, &picture);
-    double right = 2 * p[AT_X] - floor(2 * p[AT_X]), down = 2 * p[AT_Y] - floor(2 * p[AT_Y]);
+    float right = (float)(2 * p[AT_X] - floor(2 * p[AT_X])), down = (float)(2 * p[AT_Y] - floor(2 * p[AT_Y]));
+    float left = 1 - right, up = 1 - down;
     int64_t opposite_row = (int64_t)(floor(2 * p[AT_Y]) - 2 * (floor(p[AT_Y]) - SIDE / 2));
     int64_t opposite_column = (int64_t)(floor(2 * p[AT_X]) - 2 * (floor(p[AT_X]) - SIDE / 2));
-    double unlike = 0.0, opposites = 0.0, beside = 0.0, neighbours = 0.0;
+    float unlike = 0, opposites = 0, beside = 0, neighbours = 0;
     for (int64_t row = picture.first_row; row <= picture.last_row; row++) {
-        const double *here = picture.residual[row];
-        const double *above = picture.residual[opposite_row - row], *below = above + SIDE;
+        const float *here = picture.residual[row];
+        const float *above = picture.residual[opposite_row - row], *below = above + SIDE;
         for (int64_t column = picture.first_column; column <= picture.last_column; column++) {
             int64_t before = opposite_column - column;
-            double upper = (1 - right) * above[before] + right * above[before + 1];
-            double lower = (1 - right) * below[before] + right * below[before + 1];
-            double difference = here[column] - (1 - down) * upper - down * lower;
-            double step = here[column] - here[column + 1];
-            unlike += isnan(difference) ? 0.0 : difference * difference;
-            opposites += isnan(difference) ? 0.0 : 1.0;
-            beside += isnan(step) ? 0.0 : step * step;
-            neighbours += isnan(step) ? 0.0 : 1.0;
+            float upper = left * above[before] + right * above[before + 1];
+            float lower = left * below[before] + right * below[before + 1];
+            float difference = here[column] - up * upper - down * lower;
+            float step = here[column] - here[column + 1];
+            unlike += isnan(difference) ? 0 : difference * difference;
+            opposites += isnan(difference) ? 0 : 1;
+            beside += isnan(step) ? 0 : step * step;
+            neighbours += isnan(step) ? 0 : 1;
         }
     }
-    double gain = 1.0 + ((1 - right) * (1 - right) + right * right) * ((1 - down) * (1 - down) + down * down);
+    double gain = 1.0 + (left * left + right * right) * (up * up + down * down);
     /* four parameters took their share of what is not alike on opposite sides: half of all freedoms */
     found[UNLIKE_OPPOSITES] = opposites > 40 ? unlike / gain / (opposites - 8) : found[VARIANCE];
     found[UNLIKE_NEIGHBOURS] = beside / 2 / greater(neighbours, 1.0);

@@ -33,13 +33,17 @@ int gather(const Image *image, const double *p, const double *size, Window *wind
         Interval part = overlap(x2 * y, y2, half1 * sine, (Interval){-reach_x, reach_x});
         part = overlap(x1 * y, y1, half2 * sine, part);
         int64_t first = (int64_t)ceil(part.low + p[AT_X]), last = (int64_t)floor(part.high + p[AT_X]);
-        if (n + last - first >= MOST_PIXELS)
+        int count = last < first ? 0 : (int)(last - first + 1);
+        if (n + count > MOST_PIXELS)
             return 0;
-        for (int64_t column = first; column <= last; column++, n++) {
-            window->x[n] = column - p[AT_X];
-            window->y[n] = y;
-            window->level[n] = image->pixels[row * image->width + column];
+        const uint16_t *pixels = image->pixels + row * image->width + first;
+        float from = (float)(first - p[AT_X]);
+        for (int k = 0; k < count; k++) {
+            window->x[n + k] = from + (float)k;
+            window->y[n + k] = (float)y;
+            window->level[n + k] = pixels[k];
         }
+        n += count;
     }
     window->count = n;
     return 1;
