@@ -26,6 +26,6 @@ def test_derivatives_are_those_of_the_model(second_edge: float) -> None:
     analytic = columns(p)
     for k in range(PARAMETERS):
         step = np.zeros(PARAMETERS)
-        step[k] = 1e-5
-        numeric = -(columns(p + step)[-1] - columns(p - step)[-1]) / 2e-5
+        step[k] = 4e-3  # far enough for single precision, near enough for the model to be straight
+        numeric = -(columns(p + step)[-1] - columns(p - step)[-1]) / 8e-3
         assert np.abs(numeric - analytic[k]).max() < 0.04 * np.abs(analytic[k]).max()
