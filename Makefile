@@ -61,7 +61,8 @@ coverage: $(VENV)/.dev
 # Wheel and sdist into dist/, and the wheel with all its extras at work in a clean environment.
 release: $(VENV)/.dev
 	rm -rf dist .venv-release
-	$(BIN)/python -m hatchling build --directory dist
+	$(BIN)/python -m hatchling build --target sdist --directory dist
+	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir dist dist/*.tar.gz
 	$(PYTHON) -m venv .venv-release
 	.venv-release/bin/python -m pip install --quiet --disable-pip-version-check --no-compile "$$(ls dist/*.whl)[all]"
 	cd dist && ../.venv-release/bin/opencsp-calib --version && ../.venv-release/bin/opencsp-calib plugins

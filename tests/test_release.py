@@ -1,6 +1,8 @@
 """What is published: wheel and sdist, built and looked into, and the wheel at work in an environment of its own."""
 
 import re
+import runpy
+import shutil
 import subprocess
 import sys
 import tarfile
@@ -11,6 +13,8 @@ from pathlib import Path
 import pytest
 import yaml
 from environments import Environment
+
+from opencsp_calib.native import SUFFIX
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -26,13 +30,11 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
     """The wheel, made from the sdist as installers do, and the sdist."""
     pytest.importorskip("hatchling", reason="it is built with hatchling")
     folder = tmp_path_factory.mktemp("dist")
-    build = [sys.executable, "-m", "hatchling", "build", "--directory", str(folder), "--target"]
-    subprocess.run([*build, "sdist"], cwd=ROOT, check=True, capture_output=True)
+    build = [sys.executable, "-m", "hatchling", "build", "--directory", str(folder), "--target", "sdist"]
+    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
     (sdist,) = folder.glob("*.tar.gz")
-    with tarfile.open(sdist) as archive:
-        archive.extractall(folder, filter="data")
-    unpacked = folder / sdist.name.removesuffix(".tar.gz")
-    subprocess.run([*build, "wheel"], cwd=unpacked, check=True, capture_output=True)
+    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", str(folder), str(sdist)]
+    subprocess.run(build, check=True, capture_output=True)
     (wheel,) = folder.glob("*.whl")
     return wheel, sdist
 
@@ -45,6 +47,8 @@ def test_the_wheel_holds_what_runs_and_nothing_else(built: tuple[Path, Path]) ->
     packages = {path.name for path in (ROOT / "plugins").iterdir() if (path / "__init__.py").is_file()}
     assert tops == {"opencsp_calib", *packages, f"opencsp_calib-{PROJECT['version']}.dist-info"}
     assert {"opencsp_calib/py.typed", "opencsp_calib/report/style.css"} <= names
+    assert f"opencsp_calib/_native{SUFFIX}" in names
+    assert re.search(r"-py3-none-(?!any)", built[0].name)  # one for all versions of Python, of one kind of machine
     assert any(name.endswith("dist-info/licenses/LICENSE") for name in names)
     assert not [name for name in names if re.search(r"__pycache__|test_|conftest|\.png$", name)]
     tracked = subprocess.run(["git", "ls-files", "opencsp_calib", "plugins"], cwd=ROOT, capture_output=True, text=True)
@@ -59,6 +63,7 @@ def test_the_sdist_holds_all_to_test_and_document_it(built: tuple[Path, Path]) -
     with tarfile.open(built[1]) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
     wanted = {"LICENSE", "README.md", "CHANGELOG.md", "CITATION.cff", "Makefile", "tests/conftest.py", "docs/conf.py"}
+    wanted |= {"native/build_hook.py", "native/corner_fit.c", "native/exported.h"}
     wanted |= {"plugins/opencsp_calib_opencv/__init__.py", "validation/bench.py", ".ci/system-packages"}
     assert wanted <= names
     assert not [name for name in names if "_build" in name or "__pycache__" in name]
@@ -72,6 +77,20 @@ def test_the_wheel_works_in_an_environment_of_its_own(built: tuple[Path, Path], 
     said = environment.run("-m", "opencsp_calib", "--version").stdout
     assert said.startswith(f"opencsp-calib {PROJECT['version']},")
     assert {("solver", "bundle"), ("solver", "opencv"), ("detector", "checkerboard")} <= environment.plugins()
+
+
+def test_a_machine_without_a_compiler_gets_one(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    pytest.importorskip("hatchling", reason="it is built with hatchling")
+    hook = runpy.run_path(str(ROOT / "native" / "build_hook.py"))["NativeLibraries"]
+    monkeypatch.setattr(shutil, "which", lambda _: None)
+    monkeypatch.delenv("CC", raising=False)
+
+    def fetched(root: Path) -> list[str]:
+        return hook(str(root), {}, None, None, str(tmp_path), "wheel").dependencies()
+
+    assert [name.partition(">")[0] for name in fetched(tmp_path)] == ["ziglang"]
+    monkeypatch.setenv("CC", "ccache gcc")
+    assert fetched(tmp_path) == []
 
 
 def test_the_version_is_in_one_place_and_the_others_agree() -> None:
