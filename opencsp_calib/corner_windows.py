@@ -68,6 +68,9 @@ class Surroundings:
 
         Not to `examine` leaves out all but where the corners are, and takes two thirds of the time.
         """
+        nothing = CornerFit(start.parameters, np.full((len(where), DIAGNOSTICS), float(FAILED)))
+        if not where.any():
+            return nothing
         windows = self.windows(start, size)
         chosen = np.flatnonzero(where & np.isfinite(windows[:, 0]))
         parameters = start.parameters[chosen]
@@ -75,7 +78,6 @@ class Surroundings:
             self.image, self.white, parameters, self.bends[chosen], windows[chosen], size.tolerance_px, MOST_STEPS,
             examine=examine,
         )  # fmt: skip
-        nothing = CornerFit(start.parameters, np.full((len(where), DIAGNOSTICS), float(FAILED)))
         return nothing.replaced(chosen, CornerFit(parameters, found))
 
     def windows(self, fit: CornerFit, size: WindowSize) -> Floats:

@@ -102,26 +102,22 @@ def _continued(here: Sequence[Direction], there: Sequence[Direction], slot: int)
 
 def _mutual_and_sharp(grey: NDArray[np.float32], saddles: Saddles, found: Links) -> Links:
     """Only the links that both ends want, and that run along an edge from end to end."""
+    backs = found[found][:, [[0], [1], [2], [3]], [[2, 3], [2, 3], [0, 1], [0, 1]]]
+    corner, slot = np.nonzero((found >= 0) & (backs == np.arange(len(found))[:, None, None]).any(axis=2))
+    other = found[corner, slot]
+    sharp = _along_edge(grey, saddles, corner, other, slot < 2)
     kept = np.full_like(found, -1)
-    everyone = np.arange(len(found))
-    for slot in range(4):
-        other = found[:, slot]
-        backs = found[other][:, [2, 3] if slot < 2 else [0, 1]]
-        mutual = np.nonzero((other >= 0) & (backs == everyone[:, None]).any(axis=1))[0]
-        sharp = mutual[_along_edge(grey, saddles, mutual, other[mutual], dark_first=slot < 2)]
-        kept[sharp, slot] = other[sharp]
+    kept[corner[sharp], slot[sharp]] = other[sharp]
     return kept
 
 
-def _along_edge(grey: NDArray[np.float32], saddles: Saddles, start: Links, end: Links, *, dark_first: bool) -> Mask:
-    if len(start) == 0:
-        return np.zeros(0, dtype=np.bool_)
+def _along_edge(grey: NDArray[np.float32], saddles: Saddles, start: Links, end: Links, dark_first: Mask) -> Mask:
     way = saddles.pixels[end] - saddles.pixels[start]
     across = 0.18 * np.column_stack([-way[:, 1], way[:, 0]])[:, None]
     between = saddles.pixels[start][:, None] + way[:, None] * np.array([0.3, 0.5, 0.7])[:, None]
     step = sample(grey, between - across) - sample(grey, between + across)
     least = EDGE_FRACTION * np.minimum(saddles.contrast[start], saddles.contrast[end])
-    return np.asarray((step if dark_first else -step).min(axis=1) > least)
+    return np.asarray(np.where(dark_first[:, None], step, -step).min(axis=1) > least)
 
 
 def _between_lines(a: Floats, b: Floats) -> Floats:

@@ -15,6 +15,7 @@ __all__ = ["Rings", "look", "sample"]
 
 SAMPLES = 32
 HALF = SAMPLES // 2
+MOST_ROWS = 32_000  # OpenCV's `remap` makes no more than 32766
 NARROWEST_RAD = np.radians(15)  # a square seen at less is too oblique to be measured
 
 
@@ -47,6 +48,8 @@ def sample(grey: NDArray[np.float32], pixels: Pixels) -> Floats:
 
     if pixels.size == 0:  # which OpenCV refuses
         return np.zeros(pixels.shape[:-1])
+    if len(pixels) > MOST_ROWS:
+        return np.concatenate([sample(grey, part) for part in np.split(pixels, [MOST_ROWS])])
     x, y = np.moveaxis(pixels.astype(np.float32), -1, 0)
     levels = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
     return np.asarray(levels, dtype=np.float64)

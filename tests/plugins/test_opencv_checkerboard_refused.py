@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from opencsp_calib_opencv.checkerboard import CheckerboardDetector
 from opencsp_calib_opencv.opencsp import OpenCSPDetector
+from opencsp_calib_opencv.rings import sample
 
 from opencsp_calib import Checkerboard, Detection, Image
 from opencsp_calib.rendering import Scene
@@ -119,3 +120,9 @@ def test_no_image_makes_it_fail(pixels: tuple[int, int, int], deep: bool, block:
     noise = rng.integers(0, np.iinfo(kind).max, pixels[:2], dtype=kind, endpoint=True)
     image = Image("any", np.kron(noise, np.ones((block, block), dtype=kind)))
     assert len(find(image, Checkerboard(3, 3, 0.01))) < 9
+
+
+def test_more_places_can_be_looked_at_than_opencv_takes_at_once() -> None:
+    columns, rows = np.meshgrid(np.arange(20, dtype=np.float32), np.arange(20, dtype=np.float32))
+    places = np.random.default_rng(0).uniform(0, 19, (70_000, 2, 2))
+    assert np.allclose(sample(columns + 20 * rows, places), places @ [1, 20], atol=21 / 32)
