@@ -21,12 +21,13 @@ SPEC = SmallWorld.spec
 
 
 COMMAND = [sys.executable, "-m", "opencsp_calib", "capture"]
+COUNT = 4  # of photographs: after each of them the coach learns, which takes a second
 
 
 @pytest.fixture(scope="module")
 def incoming(photographs, tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("incoming")
-    for photograph in sorted(photographs.iterdir())[:8]:
+    for photograph in sorted(photographs.iterdir())[:COUNT]:
         shutil.copyfile(photograph, folder / photograph.name)
     return folder
 
@@ -37,9 +38,9 @@ def capture(folder: Path, incoming: Path, *more: str) -> int:
 
 
 def test_a_folder_becomes_a_set_and_the_next_command_is_said(incoming, tmp_path, capsys):
-    assert capture(tmp_path / "my set", incoming, "--release", "interval:0", "--count", "7") == 0
+    assert capture(tmp_path / "my set", incoming, "--release", "interval:0", "--count", "3") == 0
     said = capsys.readouterr().err
-    assert "7 of 7 photographs" in said
+    assert "3 of 3 photographs" in said
     assert f"opencsp-calib calibrate '{tmp_path / 'my set'}' --board {SPEC} -o 'my set.h5'" in said
     assert "second, independent set" in said
     command = next(line for line in said.splitlines() if "opencsp-calib calibrate" in line)
@@ -48,10 +49,10 @@ def test_a_folder_becomes_a_set_and_the_next_command_is_said(incoming, tmp_path,
 
 
 def test_it_goes_on_where_it_stopped_and_takes_no_file_twice(incoming, tmp_path, capsys):
-    for count, taken in ((3, 3), (50, 8), (50, 8)):
+    for count, taken in ((2, 2), (50, COUNT), (50, COUNT)):
         assert capture(tmp_path, incoming, "--release", "interval:0", "--count", str(count)) == 0
         assert len(list(tmp_path.glob("*.png"))) == taken
-    assert "has 8 photographs already: going on after them" in capsys.readouterr().err
+    assert f"has {COUNT} photographs already: going on after them" in capsys.readouterr().err
 
 
 def test_a_full_disk_stops_it_with_nothing_lost(incoming, tmp_path, capsys):
@@ -59,22 +60,22 @@ def test_a_full_disk_stops_it_with_nothing_lost(incoming, tmp_path, capsys):
         pytest.skip("only root can mount a small file system")
     disk = tmp_path / "disk"
     disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=700k", "tmpfs", disk], capture_output=True).returncode:
+    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", disk], capture_output=True).returncode:
         pytest.skip("no file system can be mounted here")
     try:
         assert capture(disk / "set", incoming, "--release", "interval:0") == 2
         said = capsys.readouterr().err
         names = sorted(path.name for path in (disk / "set").iterdir())
         images = [name for name in names if name.endswith(".png")]
-        assert 1 <= len(images) < 8
+        assert 1 <= len(images) < COUNT
         for name in images:
             read_image(ImageFile(name, disk / "set" / name))
         assert not [name for name in names if name.startswith(".")]
         assert "No space left on device" in said
         assert f"the {len(images)} photographs taken are safe" in said
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
-        assert capture(disk / "set", incoming, "--release", "interval:0", "--count", "8") == 0
-        assert len(list((disk / "set").glob("*.png"))) == 8
+        assert capture(disk / "set", incoming, "--release", "interval:0", "--count", str(COUNT)) == 0
+        assert len(list((disk / "set").glob("*.png"))) == COUNT
     finally:
         subprocess.run(["umount", "-l", disk], check=True)
 
@@ -94,14 +95,14 @@ def wait_for(process: subprocess.Popen, words: str) -> str:
 @pytest.mark.skipif(os.name != "posix", reason="kills with a signal")
 def test_killed_in_the_middle_it_has_lost_nothing_and_goes_on(incoming, tmp_path):
     with started(tmp_path / "set", incoming, "--release", "interval:0") as process:
-        wait_for(process, "0003.png: 3 of 50")
+        wait_for(process, "0002.png: 2 of 50")
         process.send_signal(signal.SIGKILL)
     images = sorted((tmp_path / "set").glob("[0-9]*.png"))
-    assert len(images) >= 3
+    assert len(images) >= 2
     for path in images:
         read_image(ImageFile(path.name, path))
-    assert capture(tmp_path / "set", incoming, "--release", "interval:0", "--count", "8") == 0
-    assert len(list((tmp_path / "set").glob("*.png"))) == 8
+    assert capture(tmp_path / "set", incoming, "--release", "interval:0", "--count", str(COUNT)) == 0
+    assert len(list((tmp_path / "set").glob("*.png"))) == COUNT
 
 
 def test_keys_release_delete_and_stop(small_world, tmp_path):
