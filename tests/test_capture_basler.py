@@ -37,18 +37,18 @@ def test_sandias_photographs_through_the_camera_to_a_camera_file(data_dir: Path,
     scene = tmp_path / "scene"
     scene.mkdir()
     # a prime number: also where every second or third frame is missed, all come in time
-    for path in sorted((data_dir / "sandia_checkerboard").glob("*.png"))[:7]:
+    for path in sorted((data_dir / "sandia_checkerboard").glob("*.png"))[:5]:
         (scene / path.name).write_bytes(path.read_bytes())
     settings = {"ImageFilename": scene, "ImageFileMode": "On", "TestImageSelector": "Off", "AcquisitionFrameRate": 2}
     asked = [word for name, value in settings.items() for word in ("--set", f"{name}={value}")]
-    done = captured(tmp_path / "set", "--release", "interval:0", "--count", 10, "--device", "0815-0001", *asked)
+    done = captured(tmp_path / "set", "--release", "interval:0", "--count", 7, "--device", "0815-0001", *asked)
     assert done.returncode == 0, done.stderr
     assert "TestImageSelector = Off, AcquisitionFrameRate = 2.00, OffsetX = 0, OffsetY = 0, Width = 4096" in done.stderr
     assert "opencsp-calib calibrate" in done.stderr
     assert "second, independent set" in done.stderr
     true = {read_image(file).pixels.tobytes(): file.name for file in find_images(scene)}
     taken = {file.name: read_image(file).pixels.tobytes() for file in find_images(tmp_path / "set")}
-    assert len(taken) == 10
+    assert len(taken) == 7
     assert set(taken.values()) <= set(true)
     record = json.loads((tmp_path / "set" / "0001.json").read_text())
     assert (record["device"], record["settings"]["Width"], record["settings"]["BinningVertical"]) == (

@@ -4,6 +4,7 @@ Boards are rendered, so that where each corner is in the image is known to 1e-4 
 """
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -140,6 +141,14 @@ def _off(seen: Detection, board: Board, pose: Pose, ids: Ids) -> Floats:
 
 
 def _rendered(board: Board, roll_deg: float, tilt_deg: float) -> tuple[Image, Pose]:
+    """A photograph of the board, which whoever gets it may spoil, and its pose."""
+    image, pose = _photograph(board.spec, roll_deg, tilt_deg)
+    return replace(image, pixels=image.pixels.copy()), pose
+
+
+@lru_cache(maxsize=64)  # of half a megabyte each: several checks, and detectors of one board, look at the same
+def _photograph(spec: str, roll_deg: float, tilt_deg: float) -> tuple[Image, Pose]:
+    board = installed().board(spec)
     roll, tilt = np.deg2rad([roll_deg, tilt_deg])
     turned = np.array([[np.cos(roll), -np.sin(roll), 0.0], [np.sin(roll), np.cos(roll), 0.0], [0.0, 0.0, 1.0]])
     tilted = np.array([[np.cos(tilt), 0.0, np.sin(tilt)], [0.0, 1.0, 0.0], [-np.sin(tilt), 0.0, np.cos(tilt)]])

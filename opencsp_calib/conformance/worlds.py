@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -67,16 +68,21 @@ def world(
     model : str
     noise_px : float
     truth : Board
-        As it truly is.
+        `BOARD` as it truly is.
     given : Board, optional
         What solvers are told it is; by default the truth.
     views : int
     tilt_deg : (float, float)
     """
     camera = camera_of(model)
-    poses = random_poses(truth, camera, views, 7, tilt_deg=tilt_deg, fill=(0.5, 0.95))
+    poses = _poses(model, views, tilt_deg)
     seen = observe(camera, truth, poses, noise_px=noise_px, rng=11, nominal=given or truth)
     return World(camera, truth, poses, seen)
+
+
+@cache  # finding them takes longer than solving, and most checks want the same; no solver ever gets to see them
+def _poses(model: str, views: int, tilt_deg: tuple[float, float]) -> tuple[Pose, ...]:
+    return random_poses(BOARD, camera_of(model), views, 7, tilt_deg=tilt_deg, fill=(0.5, 0.95))
 
 
 def edited(observations: Observations, change: Callable[[int, Detection], Detection]) -> Observations:
