@@ -48,7 +48,7 @@ bench: $(VENV)/.dev
 	$(BIN)/python validation/bench.py
 
 pictures: $(VENV)/.dev
-	for script in photographs lens_models screenshots; do $(BIN)/python docs/scripts/$$script.py; done
+	for script in photographs lens_models screenshots; do $(BIN)/python docs/scripts/$$script.py || exit 1; done
 
 # One change to the code at a time: does a test notice? An hour; apart from make test.
 mutants: $(VENV)/.dev
