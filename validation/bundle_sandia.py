@@ -11,13 +11,11 @@ Way
     Spacing: the board's in y over that in x, as solved; shear: how far its axes are from square; both from the affine
     map that fits best. Height: peak to valley out of the board's plane.
 
-Run ``python validation/bundle_sandia.py [FOLDER OF SHARED DATA]``.
+Run ``python validation/bench.py bundle_sandia``.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
+from _real_data import DATA
 
 from opencsp_calib import Calibration, Checkerboard, SolveOptions, detect
 from opencsp_calib.comparison import compare
@@ -67,8 +65,7 @@ def row(observations: Observations, options: SolveOptions, weighting: str) -> st
 
 def main() -> None:
     """Print the table."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "/work/shared/data")
-    observations = detect(folder / "sandia_checkerboard" / "*.png", BOARD)
+    observations = detect(DATA / "sandia_checkerboard" / "*.png", BOARD)
     print("\n| weights | board | pixels | rms px | rejected | others' rms, from even | from odd ", end="")
     print("| halves: median, worst px | fx | fy | cx | cy | spacing y/x | shear mrad | height mm |")
     print("|---" * 15 + "|")

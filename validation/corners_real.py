@@ -13,15 +13,15 @@ Run ``python validation/bench.py corners_real``, with the real photographs where
 """
 
 from dataclasses import replace
-from os import environ
 from pathlib import Path
+
+from _real_data import DATA
 
 from opencsp_calib import Board, Checkerboard, Observations, SolveOptions, detect
 from opencsp_calib.corners import refine
 from opencsp_calib.images import find_images, read_image
 from opencsp_calib.registry import installed
 
-DATA = Path(environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SETS: dict[str, tuple[Board, float]] = {
     "opencv_left": (Checkerboard(9, 6, 0.025), 0.162),
     "sandia_checkerboard": (Checkerboard(18, 23, 0.05), 0.186),

@@ -18,11 +18,11 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
-from os import environ
 from pathlib import Path
 
 import cv2
 import numpy as np
+from _real_data import DATA
 from calib_targets import detect_chessboard
 from opencsp_calib_opencv.board_kinds import CharucoKind
 from opencsp_calib_opencv.charuco import CharucoDetector
@@ -35,7 +35,6 @@ from opencsp_calib import CharucoBoard, Checkerboard, Image
 from opencsp_calib.images import find_images, read_image
 from opencsp_calib.rendering import Exposure, Scene
 
-DATA = Path(environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SIZE = (1626, 1236)
 BOARD = Checkerboard(18, 23, 0.05)
 VIEWS = 12

@@ -12,13 +12,11 @@ Way
     has been taken out, as SOFAST's calibration of the scene takes it out. In the made world the camera, board and poses
     that were solved for are the truth; both solvers see the same noisy corners. Milliradians.
 
-Run ``python validation/flat_board_rays.py [FOLDER OF SHARED DATA]``.
+Run ``python validation/bench.py flat_board_rays``.
 """
 
-import sys
-from pathlib import Path
-
 import numpy as np
+from _real_data import DATA
 
 from opencsp_calib import Calibration, Camera, Checkerboard, calibrate, compare, solve
 from opencsp_calib.arrays import Floats, Pixels
@@ -55,8 +53,7 @@ def made_again(now: Calibration, seed: int) -> tuple[Calibration, Calibration]:
 
 def main() -> None:
     """Print the table."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else "/work/shared/data")
-    images = folder / "sandia_checkerboard" / "*.png"
+    images = DATA / "sandia_checkerboard" / "*.png"
     before = calibrate(images, BOARD, detector="opencsp", refine="none", **BEFORE)
     now = calibrate(images, BOARD)
     print(f"rms as before {before.rms_px:.4f} px, now {now.rms_px:.4f} px ({now.options.board_shape} board).")

@@ -22,6 +22,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
+from _real_data import DATA
 from opencsp_calib_mrcal.process import missing_mrcal
 
 from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions, detect
@@ -42,7 +43,6 @@ NOISE = {
 }
 FAR_M = 1e6
 PYTHON = os.environ.get("OPENCSP_CALIB_MRCAL_PYTHON", "/usr/bin/python3")
-DATA = Path(os.environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 IN_MRCALS_PYTHON = """
 import sys
 import mrcal

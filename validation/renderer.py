@@ -6,7 +6,8 @@ Claim
 Way
     Shares nothing with the renderer but the lens parameters. Edges are projected by OpenCV, and found in the image by
     adding up light along a row (or column) of pixels across them, which no symmetric blur can change but by the edge's
-    own bend, which is taken off.
+    own bend, which is taken off. Blur wider than 2 px cannot be judged like this: with squares of down to 25 px the
+    light of the next corners reaches the middle of an edge.
 
 Run ``python validation/renderer.py``.
 """
@@ -37,11 +38,6 @@ BLURS = {
     "Gaussian 0.6, motion (3, 1) px": {"psf_px": 0.6, "motion_px": (3.0, 1.0)},
     "Gaussian 2 px": {"psf_px": 2.0},
 }
-
-WAY = """Way: shares nothing with the renderer but the lens parameters. Edges are projected by OpenCV, and found in the
-image by adding up light along a row (or column) of pixels across them, which no symmetric blur can change but by the
-edge's own bend, which is taken off. Blur wider than 2 px cannot be judged like this: with squares of down to 25 px the
-light of the next corners reaches the middle of an edge."""
 
 Edge = Callable[[float], np.ndarray]  # from a fraction of the edge to its pixel
 
@@ -106,11 +102,10 @@ def errors(camera: Camera, board: Board, bow_m: float, pose: Pose, blur: dict[st
 
 def main() -> None:
     """Print the results as Markdown."""
-    print("# The renderer: are its photographs true?\n")
-    print("Claim: every edge and corner is where the camera projects it, to better than 1e-4 px rms.\n")
-    print(f"{WAY}\n")
-    print("2026-11-22, 2 cores. 1626x1236, board of 22x19 squares, 4 poses of the seed's procedure a row, no noise,")
-    print("16 bit (1/257 grey level; rounding alone gives about 1e-5 px).\n")
+    print(
+        "1626x1236, board of 22x19 squares, 4 poses of the seed's procedure a row, no noise, 16 bit (1/257 grey level;"
+    )
+    print("rounding alone gives about 1e-5 px).\n")
     print("| lens | board | blur | edges | mean px | rms px | worst px |\n|---|---|---|---|---|---|---|")
     for camera in (demo_camera(), FISHEYE):
         poses = [seed_poses(BOARD, camera)[view] for view in (0, 8, 27, 43)]
@@ -122,14 +117,15 @@ def main() -> None:
                 shape = f"bowed by {bow_m * 1e3:g} mm" if bow_m else "flat"
                 print(f"| {camera.model} | {shape} | {name} | {len(found)} | {figures} |")
                 sys.stdout.flush()
-    print("\n## Cost\n")
+    print("\n### Cost\n")
     with tempfile.TemporaryDirectory() as folder:
-        make_demo(folder, views=2)  # compiles, or reads what was compiled before
+        make_demo(folder, views=2)  # nothing is timed that is done once
         wall, work = time.perf_counter(), time.process_time()
         make_demo(folder, views=50, jobs=2)
         wall, work = time.perf_counter() - wall, time.process_time() - work
-    print(f"The demo's 50 photographs, written as PNG: {work:.1f} s of processor time in two threads, {wall:.1f} s by")
-    print("the clock (other work was going on). Compiling, the first time ever, takes about 5 s more.")
+    print(
+        f"The demo's 50 photographs, as PNG: {work:.1f} s of processor time in two threads, {wall:.1f} s by the clock."
+    )
 
 
 if __name__ == "__main__":

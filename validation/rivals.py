@@ -26,6 +26,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from _real_data import DATA
 from bundle_bowed_board import BOARD as BOWED_BOARD
 from bundle_bowed_board import CAMERA, photographs, shape_error_mm
 from bundle_sandia import BOARD as SANDIA_BOARD
@@ -38,7 +39,6 @@ from opencsp_calib.resampling import held_out
 from opencsp_calib.synthetic import bowed
 
 MODEL = "opencv4"
-DATA = Path(os.environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 WORKER = """
 import sys
 import lensboy as lb
@@ -118,9 +118,9 @@ def seconds() -> float:
     return sum(os.times()[:4])
 
 
-def sandia(folder: Path, python: str | None) -> None:
+def sandia(python: str | None) -> None:
     """Print Sandia's table."""
-    observations = detect(folder / "sandia_checkerboard" / "*.png", SANDIA_BOARD)
+    observations = detect(DATA / "sandia_checkerboard" / "*.png", SANDIA_BOARD)
     even, odd = observations.keeping(EVEN), observations.keeping(ODD)
     print("\n## Sandia's ten photographs\n")
     print("| way | rms px | others' rms, from even | from odd | halves: median, worst px | fx | fy | cx | cy ", end="")
@@ -160,5 +160,5 @@ def bowed_board(python: str | None) -> None:
 
 
 if __name__ == "__main__":
-    sandia(DATA, os.environ.get("LENSBOY_PYTHON"))
+    sandia(os.environ.get("LENSBOY_PYTHON"))
     bowed_board(os.environ.get("LENSBOY_PYTHON"))

@@ -11,16 +11,15 @@ Way
     where that is said. "Sigmas left" is how far the camera is from the least sum of squares, by our own normal
     equations. Times are wall times of `Solver.solve`, mrcal's with the start of its Python, the quickest of three.
 
-Run ``python validation/solvers.py [FOLDER OF SHARED DATA]``; it prints the tables of ``validation/results/solvers.md``.
+Run ``python validation/bench.py solvers``.
 """
 
-import sys
 import time
 from itertools import combinations
-from pathlib import Path
 
 import h5py
 import numpy as np
+from _real_data import DATA
 
 from opencsp_calib.board import Checkerboard
 from opencsp_calib.calibration import Calibration
@@ -54,9 +53,9 @@ def wide_world(model: str, noise_px: float) -> tuple[Camera, Observations]:
     return camera, observe(camera, BOARD, poses, noise_px=noise_px, rng=3)
 
 
-def sandia(folder: Path) -> Observations:
+def sandia() -> Observations:
     """Sandia's ten photographs, with the corners that OpenCSP has stored."""
-    with h5py.File(folder / "sandia_checkerboard" / "expected_opencsp.h5") as file:
+    with h5py.File(DATA / "sandia_checkerboard" / "expected_opencsp.h5") as file:
         pixels = file["p_image_points"][()].astype(np.float64)
     views = [View(f"{n:03}.png", Detection(np.arange(414), p.T), "used") for n, p in enumerate(pixels, start=1)]
     return Observations(Checkerboard(18, 23, 0.05), (1626, 1236), tuple(views))
@@ -93,13 +92,13 @@ def exact() -> None:
             print(f"| {world} | {model} | {name} | {worst:.1e} | {aligned:.1e} | {found.rms_px:.1e} |")
 
 
-def agreement(folder: Path) -> None:
+def agreement() -> None:
     """Print how far from each other solvers end that are given the same."""
     print(
         "\n## One minimum\n\n| observations | model | solvers | worst px | worst px, aligned |\n|---|---|---|---|---|"
     )
     left = []
-    sets = [("Sandia", model, sandia(folder)) for model in ("pinhole", "opencv4", "opencv5", "opencv8")]
+    sets = [("Sandia", model, sandia()) for model in ("pinhole", "opencv4", "opencv5", "opencv8")]
     sets += [("seed's world", model, seed_world(50, NOISE_PX)[1]) for model in ("opencv4", "opencv5")]
     models = ("opencv4", "opencv8", "opencv12", "opencv14", "opencv_fisheye")
     sets += [("wide world", model, wide_world(model, NOISE_PX)[1]) for model in models]
@@ -147,10 +146,9 @@ def times() -> None:
 
 def main() -> None:
     """Print everything."""
-    folder = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[2] / "shared" / "data")
     print(", ".join(f"{name} {solver.version()}" for name, solver in SOLVERS.items()), "\n")
     exact()
-    agreement(folder)
+    agreement()
     times()
 
 

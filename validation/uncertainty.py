@@ -19,11 +19,10 @@ Way
 Times are of one processor. Run ``python validation/bench.py uncertainty``: half an hour.
 """
 
-import os
 import time
-from pathlib import Path
 
 import numpy as np
+from _real_data import DATA
 from opencsp_calib_bundle.solver import BundleSolver
 
 from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions, detect
@@ -53,7 +52,6 @@ NOISE = {
     "board flexes by 0.2 mm rms, 0.03 px": {"noise_px": 0.03, "flex_m": 2e-4},
 }
 WORLDS = {"flat": {10: 200, 20: 200, 50: 200}, "free": {10: 200, 20: 100, 50: 100}}
-DATA = Path(os.environ.get("OPENCSP_CALIB_DATA", Path(__file__).parents[2] / "shared" / "data"))
 SANDIA = Checkerboard(18, 23, 0.05)
 
 
@@ -114,9 +112,9 @@ def coverage_table() -> None:
                 )
 
 
-def sandia_tables(folder: Path) -> None:
+def sandia_tables() -> None:
     """Sigmas, halves and influence of three ways to solve."""
-    seen = detect(folder / "sandia_checkerboard", SANDIA)
+    seen = detect(DATA / "sandia_checkerboard", SANDIA)
     print("### Sandia's ten photographs, model-fit corners, equal weights\n")
     print("| board | pixels | rms px | fx | cx | residual sigma fx, cx | jackknife fx, cx | honest fx, cx |", end="")
     print(" projection, honest, rms over image | halves, median (predicted) | flatness | pitch y/x | shear |")
@@ -184,6 +182,6 @@ def jackknife_cost() -> None:
 
 if __name__ == "__main__":
     with blas_on_one_thread():  # as in the pipeline
-        sandia_tables(DATA)
+        sandia_tables()
         jackknife_cost()
         coverage_table()

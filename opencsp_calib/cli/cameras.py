@@ -48,8 +48,8 @@ def show(
 
 
 def compare(
-    a: CameraFile,
-    b: CameraFile,
+    a: Annotated[Path, typer.Argument(metavar="A", help="A camera file of any format we read.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another.")],
     camera: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="Which camera of a file that has several; given twice, of A and of B."),

@@ -77,7 +77,8 @@ def demo(
     _say_demo(calibration, world.camera, difference)
     say_problems(judge(calibration))
     say(f"rendered in {rendered - started:.1f} s, calibrated in {solved - rendered:.1f} s")
-    say(f"camera and report saved in {folder}")
+    say(f"camera saved: {folder / 'camera.h5'}")
+    say(f"report saved: {folder / 'report.html'}; open it in a browser")
     if json:
         from opencsp_calib.summary import camera_as_json
 
