@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -84,21 +83,33 @@ def test_projects_as_colmap_half_a_pixel_off(model: str, theirs: str) -> None:
     np.testing.assert_allclose(camera.project(rays), colmap.img_from_cam(rays) - 0.5, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("model", ["pinhole", "opencv4", "opencv5", "opencv8", "opencv12"])
-def test_projects_as_mrcal(model: str, tmp_path: Path) -> None:
+MRCALS = ("pinhole", "opencv4", "opencv5", "opencv8", "opencv12")
+MRCAL_PROJECTS = """
+import sys, numpy as np, mrcal
+for model in sys.argv[1:]:
+    rays, params = np.load(f"rays_{model}.npy"), np.load(f"params_{model}.npy")
+    np.save(f"pixels_{model}.npy", mrcal.project(rays, f"LENSMODEL_{model.upper()}", params))
+"""
+
+
+@pytest.fixture(scope="module")
+def by_mrcal(tmp_path_factory: pytest.TempPathFactory) -> dict[str, np.ndarray]:
+    """The pixels where mrcal, of Debian's Python, projects the rays of :func:`grid` with each model that it has too."""
     python = shutil.which("python3", path="/usr/bin")
     if python is None or subprocess.run([python, "-c", "import mrcal"], capture_output=True).returncode:
         pytest.skip("Debian's mrcal is not installed")
+    folder = tmp_path_factory.mktemp("mrcal")
+    for model in MRCALS:
+        np.save(folder / f"rays_{model}.npy", CAMERAS[model].unproject(grid()))
+        np.save(folder / f"params_{model}.npy", CAMERAS[model].params)
+    subprocess.run([python, "-c", MRCAL_PROJECTS, *MRCALS], cwd=folder, check=True)
+    return {model: np.load(folder / f"pixels_{model}.npy") for model in MRCALS}
+
+
+@pytest.mark.parametrize("model", MRCALS)
+def test_projects_as_mrcal(model: str, by_mrcal: dict[str, np.ndarray]) -> None:
     camera = CAMERAS[model]
-    rays = camera.unproject(grid())
-    np.save(tmp_path / "rays.npy", rays)
-    np.save(tmp_path / "params.npy", camera.params)
-    script = (
-        "import numpy as np, mrcal; r, p = np.load('rays.npy'), np.load('params.npy');"
-        f"np.save('pixels.npy', mrcal.project(r, 'LENSMODEL_{model.upper()}', p))"
-    )
-    subprocess.run([python, "-c", script], cwd=tmp_path, check=True)
-    np.testing.assert_allclose(camera.project(rays), np.load(tmp_path / "pixels.npy"), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(camera.project(camera.unproject(grid())), by_mrcal[model], rtol=0, atol=1e-9)
 
 
 @every_model

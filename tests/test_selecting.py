@@ -70,9 +70,7 @@ def test_a_wrong_view_is_not_chosen_however_much_it_seems_to_tell(
     best = selection.observations.used[0]
     rng = np.random.default_rng(4)
     torn = replace(best.detection, pixels=best.detection.pixels + rng.normal(0, 4, best.detection.pixels.shape))
-    views = tuple(
-        replace(v, detection=torn) if v is not None and v.image == best.image else v for v in observations.views
-    )
+    views = tuple(replace(v, detection=torn) if v.image == best.image else v for v in observations.views)
     found = select(replace(observations, views=views), COUNT, **OPTIONS).observations
     (wrong,) = (view for view in found.views if view.image == best.image)
     assert (wrong.status, wrong.problems[-1].code) == ("dropped", "misfit")
