@@ -80,11 +80,8 @@ class CornerTable:
 
     def of_views(self, views: slice) -> "CornerTable":
         """Only the views that a slice takes, in the order they are in."""
-        mask = self.in_views(views)
         first = np.concatenate([[0], np.cumsum(self.counts[views])]).astype(np.int64)
-        return CornerTable(
-            self.ids[mask], self.pixels[mask], first, None if self.whitening is None else self.whitening[mask]
-        )
+        return replace(self.keeping(self.in_views(views)), first=first)
 
     def thinned(self, count: int) -> "CornerTable":
         """About as many corners, some of every view: the same share of each, but at least `LEAST` where it has them.

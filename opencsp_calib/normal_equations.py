@@ -7,7 +7,7 @@ apart. With V views, C corners solved for, and M shared unknowns (Q of the camer
 
     shared   (V, M, M)      shared_pose   (V, M, 6)      shared_gradient   (V, M)
     pose     (V, 6, 6)                                   pose_gradient     (V, 6)
-    corner   (C, 3, 3)      corner_shared (C, 3, M)      corner_gradient   (C, 3)
+    corner   (C, 3, 3)      corner_shared (3, M, C)      corner_gradient   (C, 3)
 
 Blocks with a V are of one view; summed over it they are those of the whole, as the others are. What ties each corner
 to each pose is not kept, since it would take several times the memory of the corners themselves: `NormalEquations.rows`
@@ -122,8 +122,8 @@ class NormalEquations:
 
     @property
     def corner_shared(self) -> Floats:
-        """(C, 3, M)."""
-        return np.asarray(self.by_corner[:, CORNER:-1].transpose(2, 0, 1))
+        """(3, M, C), as it lies in memory."""
+        return self.by_corner[:, CORNER:-1]
 
     @property
     def corner_gradient(self) -> Floats:

@@ -117,7 +117,7 @@ class PosesKept(Factorisation):
             corner = np.einsum("ikn,akn->ain", by_root[:, :, rows.columns], rows.corner)
             of_view = slice(POSE * rows.view, POSE * rows.view + POSE)
             coupling[:, of_view, rows.columns] = np.einsum("ain,apn->ipn", corner, rows.pose)
-        coupling[:, poses:] = np.einsum("ikn,kmn->imn", by_root, equations.by_corner[:, CORNER:-1])
+        coupling[:, poses:] = np.einsum("ikn,kmn->imn", by_root, equations.corner_shared)
         ties = equations.shared_pose.transpose(0, 2, 1).reshape(poses, -1)
         shared = _damped(equations.shared.sum(axis=0), damping)
         reduced = np.block([[_block_diagonal(_damped(equations.pose, damping)), ties], [ties.T, shared]])
@@ -169,8 +169,7 @@ class CornersKept(Factorisation):
         reduced = np.zeros((corners + equations.unknowns.shared,) * 2)
         for row, column in np.ndindex(CORNER, CORNER):
             reduced[row * len(every) + every, column * len(every) + every] = blocks[:, row, column]
-        ties = equations.by_corner[:, CORNER:-1].swapaxes(0, 1)
-        reduced[corners:, :corners] = ties.reshape(len(ties), corners)
+        reduced[corners:, :corners] = equations.corner_shared.swapaxes(0, 1).reshape(equations.unknowns.shared, corners)
         reduced[corners:, corners:] = _damped(equations.shared.sum(axis=0), damping)
         gradient = np.concatenate([equations.corner_gradient.T.ravel(), equations.shared_gradient.sum(axis=0)])
         alone = inverse_roots @ equations.pose_gradient[:, :, None]
