@@ -70,25 +70,26 @@ def checked(value: ArrayLike, name: str, shape: Sequence[int | None], *, finite:
 
 
 def frozen(value: ArrayLike, name: str, shape: Sequence[int | None], *, finite: bool = True) -> Floats:
-    """Like `checked`, as a read-only copy."""
-    return _read_only(checked(value, name, shape, finite=finite).copy())
+    """Like `checked`, as a read-only copy; one that is given comes back as it is."""
+    array = checked(value, name, shape, finite=finite)
+    return array if _is_frozen(array) else _read_only(array.copy())
 
 
 def frozen_ids(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Ids:
-    """A read-only copy as int64; fractions are refused."""
+    """A read-only copy as int64, or what is given if it is one; fractions are refused."""
     array = np.asarray(value)
-    ids = array.astype(np.int64)
+    ids = array.astype(np.int64, copy=False)
     _check_shape(ids.shape, name, shape)
     if array.dtype.kind not in "iu" and not np.array_equal(ids, array):
         raise InputError(f"{name} must be whole numbers")
-    return _read_only(ids)
+    return ids if _is_frozen(ids) else _read_only(ids.copy())
 
 
 def frozen_mask(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Mask:
-    """A read-only copy as bool."""
-    mask = np.array(value, dtype=np.bool_)
+    """A read-only copy as bool; one that is given comes back as it is."""
+    mask = np.asarray(value, dtype=np.bool_)
     _check_shape(mask.shape, name, shape)
-    return _read_only(mask)
+    return mask if _is_frozen(mask) else _read_only(mask.copy())
 
 
 def _check_shape(shape: tuple[int, ...], name: str, expected: Sequence[int | None]) -> None:
@@ -97,6 +98,10 @@ def _check_shape(shape: tuple[int, ...], name: str, expected: Sequence[int | Non
         letters = iter("NMLK")
         wanted = ", ".join(next(letters) if e is None else str(e) for e in expected)
         raise InputError(f"{name} has shape {shape}, expected ({wanted}{',' if len(expected) == 1 else ''})")
+
+
+def _is_frozen(array: NDArray) -> bool:  # type: ignore[type-arg]  # any dtype
+    return array.base is None and not array.flags.writeable
 
 
 def _read_only(array: NDArray) -> NDArray:  # type: ignore[type-arg]  # any dtype in, the same dtype out

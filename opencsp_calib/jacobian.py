@@ -141,11 +141,17 @@ def _fill(
 
 def split_by_view(table: CornerTable, unknowns: Unknowns, views: tuple[int, int], values: Floats) -> Iterator[ViewRows]:
     """The rows of a run of views (2, 3 + M + 7, n), one view after the other."""
-    for view in range(*views):
-        ids = table.ids[table.span(view, view + 1)]
-        all_seen = np.array_equal(ids, unknowns.corners)
-        columns = slice(None) if all_seen else np.searchsorted(unknowns.corners, ids)
-        yield ViewRows(view, columns, values[:, :, table.span(view, view + 1, since=views[0])])
+    ids = table.ids[table.span(*views)]
+    first = (table.first[views[0] : views[1] + 1] - table.first[views[0]]).tolist()
+    for view, begin, end in zip(range(*views), first, first[1:], strict=False):
+        yield ViewRows(view, _columns(ids[begin:end], unknowns.corners), values[:, :, begin:end])
+
+
+def _columns(ids: Ids, corners: Ids) -> Ids | slice:
+    """Where corners are among those solved for."""
+    if len(ids) == len(corners) and (ids == corners).all():
+        return slice(None)
+    return np.searchsorted(corners, ids)
 
 
 def _by_camera(by_params: Floats, unknowns: Unknowns) -> Floats:
