@@ -90,10 +90,10 @@ class CornerTable:
         """
         if len(self) <= count:
             return self
-        wanted = np.maximum(LEAST, count / len(self) * self.counts)
-        order = np.argsort(self.view + np.random.default_rng(len(self)).random(len(self)))
-        mask = np.empty(len(self), dtype=np.bool_)
-        mask[order] = np.arange(len(self)) - self.first[self.view] < wanted[self.view]
+        wanted = np.ceil(np.maximum(LEAST, count / len(self) * self.counts)).astype(np.int64)
+        random, mask = np.random.default_rng(len(self)), np.zeros(len(self), dtype=np.bool_)
+        for first, size, some in zip(self.first, self.counts, wanted, strict=False):
+            mask[first + random.permutation(size)[:some]] = True
         return self.keeping(mask)
 
     def whitened(self, residuals: Floats) -> Floats:
@@ -128,15 +128,16 @@ def _whitening(detections: Sequence[Detection]) -> Floats:
     covariances = np.concatenate(
         [np.full((len(d), 2, 2), np.nan) if d.covariance is None else d.covariance for d in detections]
     )
-    with np.errstate(invalid="ignore"):
-        determinant = covariances[:, 0, 0] * covariances[:, 1, 1] - covariances[:, 0, 1] * covariances[:, 1, 0]
-        usable = (determinant > 0) & (covariances[:, 0, 0] > 0)
-    typical = np.median(covariances[usable][:, [0, 1], [0, 1]]) if usable.any() else 1.0
-    covariances[~usable] = typical * np.eye(2)
-    # the inverse of each Cholesky factor, in closed form: LAPACK takes ten times as long for such small ones
     xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
-    whitening = np.zeros_like(covariances)
-    whitening[:, 0, 0] = 1.0 / np.sqrt(xx)
-    whitening[:, 1, 1] = 1.0 / np.sqrt(yy - xy * xy / xx)
-    whitening[:, 1, 0] = -xy / xx * whitening[:, 1, 1]
-    return whitening
+    with np.errstate(invalid="ignore"):
+        usable = (xx * yy - xy * xy > 0) & (xx > 0)
+    if not usable.all():
+        typical = np.median(covariances[usable][:, [0, 1], [0, 1]]) if usable.any() else 1.0
+        covariances[~usable] = typical * np.eye(2)
+    # the inverse of each Cholesky factor, in closed form, as LAPACK takes ten times as long for such small ones; and in
+    # the same memory
+    covariances[:, 1, 1] = 1.0 / np.sqrt(yy - xy * xy / xx)
+    covariances[:, 1, 0] = -xy / xx * yy
+    covariances[:, 0, 0] = 1.0 / np.sqrt(xx)
+    covariances[:, 0, 1] = 0.0
+    return covariances

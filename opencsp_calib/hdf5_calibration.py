@@ -31,7 +31,7 @@ JSON stands for a string dataset with JSON in it. Two files are equal when every
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -52,6 +52,8 @@ if TYPE_CHECKING:
 
 __all__ = ["load_calibration", "load_observations", "save_calibration", "save_observations"]
 
+TOGETHER = 64  # views, whose corners are written at once
+
 
 def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> None:
     """Write a camera file with its calibration, aside and then in place.
@@ -67,8 +69,8 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         _write_observations(calibration.observations, group.create_group("observations"))
         group["poses"] = np.array([[*p.rotation, *p.translation] for p in calibration.cam_from_board]).reshape(-1, 6)
         group["board_points"] = calibration.board.points
-        group["residuals"] = np.concatenate([np.empty((0, 2)), *calibration.residuals])
-        group["outliers"] = np.concatenate([np.empty(0, dtype=bool), *calibration.outliers])
+        _write_on_end(group, "residuals", calibration.residuals, (2,))
+        _write_on_end(group, "outliers", calibration.outliers, (), dtype=np.bool_)
         group["covariance"] = calibration.covariance
         group["covariance_residual"] = calibration.covariance_residual
         group["solver"] = calibration.solver
@@ -140,11 +142,23 @@ def _write_observations(observations: Observations, group: "h5py.Group") -> None
     group["board_points"] = board.points
     group["views"] = json.dumps([stored_view(view) for view in views])
     group["corners"] = np.array([len(view.detection) for view in views], dtype=np.int32)
-    group["ids"] = np.concatenate([np.empty(0, dtype=np.int64), *(view.detection.ids for view in views)])
-    group["pixels"] = np.concatenate([np.empty((0, 2)), *(view.detection.pixels for view in views)])
+    _write_on_end(group, "ids", [view.detection.ids for view in views], (), dtype=np.int64)
+    _write_on_end(group, "pixels", [view.detection.pixels for view in views], (2,))
     for name, shape in OPTIONAL.items():
         known = [_or_nan(getattr(view.detection, name), (len(view.detection), *shape)) for view in views]
-        group[name] = np.concatenate([np.empty((0, *shape)), *known])
+        _write_on_end(group, name, known, shape)
+
+
+def _write_on_end(
+    group: "h5py.Group", name: str, arrays: Sequence[Any], shape: tuple[int, ...], dtype: type = np.float64
+) -> None:
+    """Write what is known of each view's corners, (n, ...), as one dataset; but never make one array of all."""
+    dataset = group.create_dataset(name, (sum(map(len, arrays)), *shape), dtype)
+    end = 0
+    for first in range(0, len(arrays), TOGETHER):
+        part = np.concatenate(arrays[first : first + TOGETHER])
+        begin, end = end, end + len(part)
+        dataset[begin:end] = part
 
 
 def _read_observations(group: "h5py.Group") -> Observations:

@@ -26,6 +26,7 @@ FOCAL_LENGTHS = np.geomspace(0.15, 30.0, 20)  # in image sides
 REFINEMENTS = 6  # each halves the step between focal lengths, of 32 %
 SEARCH_VIEWS, SEARCH_CORNERS = 12, 40  # as many as the search for the focal length looks at
 CORNERS = 80  # as many as a pose is found from
+TOGETHER = 64  # views whose poses are found at once
 
 
 def initial_camera(
@@ -72,9 +73,14 @@ def initial_poses(camera: Camera, observations: Observations) -> tuple[Pose, ...
     tuple of Pose
         ``cam_from_board``, one per used view.
     """
-    search = _PoseSearch(observations.board.points, observations.detections, CORNERS)
-    rotations, translations = search.poses(camera.lens, camera.params)
-    return tuple(Pose(r, t) for r, t in zip(rotation_vectors(rotations), translations, strict=True))
+    poses: list[Pose] = []
+    for first in range(0, len(observations.detections), TOGETHER):
+        some = observations.detections[first : first + TOGETHER]
+        rotations, translations = _PoseSearch(observations.board.points, some, CORNERS).poses(
+            camera.lens, camera.params
+        )
+        poses += (Pose(r, t) for r, t in zip(rotation_vectors(rotations), translations, strict=True))
+    return tuple(poses)
 
 
 def rough_tilts(observations: Observations) -> dict[str, float]:

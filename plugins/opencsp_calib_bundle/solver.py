@@ -101,7 +101,7 @@ def _roughly_from(observations: Observations, model: str, options: SolveOptions,
     _, unknowns = _solvable(observations, lens, replace(options, board_shape="flat"), table)
 
     def from_start(chosen: SolveOptions) -> Estimate:
-        return _rough_minimum(lens, table, start(observations, model, chosen), unknowns, options.robust)
+        return _rough_minimum(lens, table, start(observations, model, chosen, table), unknowns, options.robust)
 
     def misfit(estimate: Estimate) -> float:
         return float(np.median(np.linalg.norm(residuals(lens, table, estimate), axis=1)))

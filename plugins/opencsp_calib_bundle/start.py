@@ -16,8 +16,8 @@ CLEAR = 30.0
 """A board whose depth shows by this many times the residuals cannot be taken for its mirror image."""
 
 
-def start(observations: Observations, model: str, options: SolveOptions) -> Estimate:
-    """A camera, from the guess or found, and poses, before anything is minimised.
+def start(observations: Observations, model: str, options: SolveOptions, table: CornerTable) -> Estimate:
+    """A camera, from the guess or found, and poses that see every corner of the table, before anything is minimised.
 
     Raises
     ------
@@ -29,7 +29,6 @@ def start(observations: Observations, model: str, options: SolveOptions) -> Esti
         return Estimate.posed(camera.params, initial_poses(camera, observations), observations.board.points)
 
     camera = initial_camera(observations, model, options.guess, options.pixel_aspect)
-    table = CornerTable.of(observations.detections)
     estimate = posed(camera)
     if np.isnan(residuals(camera.lens, table, estimate)).any() and camera.distortion.any():
         # the guess's distortion folds back before the outermost corners: its other numbers may still serve
