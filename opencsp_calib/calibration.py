@@ -95,7 +95,9 @@ class Calibration:
     @property
     def rms_px(self) -> float:
         """Root mean square length of the residuals, over every corner that is not an outlier."""
-        return _rms(np.concatenate([r[~o] for r, o in zip(self.residuals, self.outliers, strict=True)]))
+        squares = sum(float((r[~o] ** 2).sum()) for r, o in zip(self.residuals, self.outliers, strict=True))
+        corners = sum(map(len, self.outliers)) - self.rejected_corners
+        return float(np.sqrt(squares / corners)) if corners else float("nan")
 
     @property
     def view_rms_px(self) -> Floats:

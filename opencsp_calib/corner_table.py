@@ -1,11 +1,12 @@
-"""All corners of all used views in one table, with their weights: what a calibration is solved from."""
+"""All corners of all used views, with their weights: what a calibration is solved from."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats, Ids, Mask, Pixels
+from opencsp_calib.arrays import Covariances, Floats, Ids, Mask, Pixels
 from opencsp_calib.detection import Detection
 from opencsp_calib.options import Weights
 
@@ -17,37 +18,34 @@ CHUNK = 4096  # corners linearised at once: their Jacobians stay in the processo
 
 @dataclass(frozen=True, eq=False)
 class CornerTable:
-    """Every corner seen in the used views, view after view.
+    """Every corner seen in the used views, view after view, where detections have them: none is copied.
 
     Parameters
     ----------
-    ids : (N,) int
-    pixels : (N, 2) px
-    first : (V + 1,) int
-        Corners ``first[v]`` to ``first[v + 1]`` are of view v.
-    whitening : (N, 2, 2), optional
-        What residuals are multiplied by before they are squared: lower triangular W with WᵀW the inverse of the
-        corner's covariance; None for the identity.
+    detections : tuple of Detection
+        One per view.
+    variance : float, optional
+        px², of corners that have no usable covariance; None where covariances do not count.
+    factors : (N,), optional
+        What whitened residuals are multiplied by besides.
     """
 
-    ids: Ids
-    pixels: Pixels
-    first: Ids
-    whitening: Floats | None = None
+    detections: tuple[Detection, ...]
+    variance: float | None = None
+    factors: Floats | None = None
 
     @classmethod
     def of(cls, detections: Sequence[Detection], weights: Weights = "equal") -> "CornerTable":
         """The corners of detections, weighted ``equal`` or by their ``covariance`` where they have one."""
-        counts = [len(detection) for detection in detections]
-        return cls(
-            np.concatenate([d.ids for d in detections]) if detections else np.empty(0, dtype=np.int64),
-            np.concatenate([d.pixels for d in detections]) if detections else np.empty((0, 2)),
-            np.concatenate([[0], np.cumsum(counts)]).astype(np.int64),
-            _whitening(detections) if weights == "covariance" else None,
-        )
+        return cls(tuple(detections), _typical_variance(detections) if weights == "covariance" else None)
 
     def __len__(self) -> int:
-        return len(self.ids)
+        return int(self.first[-1])
+
+    @cached_property
+    def first(self) -> Ids:
+        """(V + 1,) where views begin: corners ``first[v]`` to ``first[v + 1]`` are of view v."""
+        return np.cumsum([0, *map(len, self.detections)])
 
     @property
     def counts(self) -> Ids:
@@ -57,20 +55,75 @@ class CornerTable:
     @property
     def view(self) -> Ids:
         """(N,) the view of each corner."""
-        return np.repeat(np.arange(len(self.first) - 1), self.counts)
+        return np.repeat(np.arange(len(self.detections)), self.counts)
 
     @property
+    def ids(self) -> Ids:
+        """(N,)."""
+        return self.ids_of(0, len(self.detections))
+
+    @property
+    def pixels(self) -> Pixels:
+        """(N, 2) px."""
+        return self.pixels_of(0, len(self.detections))
+
+    def ids_of(self, begin: int, end: int) -> Ids:
+        """(n,) those of a run of views."""
+        return np.concatenate([np.empty(0, dtype=np.int64), *(d.ids for d in self.detections[begin:end])])
+
+    def pixels_of(self, begin: int, end: int) -> Pixels:
+        """(n, 2) px those of a run of views."""
+        return np.concatenate([np.empty((0, 2)), *(d.pixels for d in self.detections[begin:end])])
+
+    def whitening(self, begin: int, end: int) -> Floats | None:
+        """(2, 2, n) what the residuals of a run of views are multiplied by before they are squared.
+
+        Lower triangular W with WᵀW the inverse of the corner's covariance; None for the identity.
+        """
+        factors = None if self.factors is None else self.factors[self.span(begin, end)]
+        if self.variance is None:
+            return None if factors is None else factors * np.eye(2)[:, :, None]
+        unknown = self.variance * np.eye(2)
+        covariances = np.concatenate(
+            [
+                np.tile(unknown, (len(d), 1, 1)) if d.covariance is None else d.covariance
+                for d in self.detections[begin:end]
+            ]
+        )
+        usable = _usable(covariances)
+        if not usable.all():
+            covariances[~usable] = unknown
+        # the inverse of each Cholesky factor, in closed form: LAPACK takes ten times as long for such small ones
+        xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+        whitening = np.zeros((2, 2, len(covariances)))
+        whitening[0, 0] = 1.0 / np.sqrt(xx)
+        whitening[1, 1] = 1.0 / np.sqrt(yy - xy * xy / xx)
+        whitening[1, 0] = -xy / xx * whitening[1, 1]
+        return whitening if factors is None else whitening * factors
+
+    def whitened(self, residuals: Floats) -> Floats:
+        """Residuals (N, 2) px, multiplied by what they are before they are squared."""
+        found = residuals.copy()
+        for run in self.chunks():
+            whitening, span = self.whitening(*run), self.span(*run)
+            if whitening is not None:
+                found[span] = np.einsum("ijn,nj->ni", whitening, residuals[span])
+        return np.asarray(found)
+
+    @cached_property
     def typical_weight(self) -> float:
         """What a residual in pixels is typically multiplied by: the median over corners and axes."""
-        return 1.0 if self.whitening is None else float(np.median(self.whitening[:, [0, 1], [0, 1]]))
+        weights = [
+            whitening[[0, 1], [0, 1]] for run in self.chunks() if (whitening := self.whitening(*run)) is not None
+        ]
+        return float(np.median(np.concatenate(weights, axis=1))) if weights else 1.0
 
     def keeping(self, mask: Mask) -> "CornerTable":
         """Only the corners where the mask (N,) is true; a view may be left with none."""
         if mask.all():
             return self
-        first = np.concatenate([[0], np.cumsum(mask)])[self.first].astype(np.int64)
-        whitening = None if self.whitening is None else self.whitening[mask]
-        return CornerTable(self.ids[mask], self.pixels[mask], first, whitening)
+        kept = tuple(d.keeping(some) for d, some in zip(self.detections, self.split(mask), strict=True))
+        return replace(self, detections=kept, factors=None if self.factors is None else self.factors[mask])
 
     def in_views(self, views: slice) -> Mask:
         """(N,) which corners are of the views that a slice takes."""
@@ -80,8 +133,8 @@ class CornerTable:
 
     def of_views(self, views: slice) -> "CornerTable":
         """Only the views that a slice takes, in the order they are in."""
-        first = np.concatenate([[0], np.cumsum(self.counts[views])]).astype(np.int64)
-        return replace(self.keeping(self.in_views(views)), first=first)
+        factors = None if self.factors is None else self.factors[self.in_views(views)]
+        return replace(self, detections=self.detections[views], factors=factors)
 
     def thinned(self, count: int) -> "CornerTable":
         """About as many corners, some of every view: the same share of each, but at least `LEAST` where it has them.
@@ -96,14 +149,9 @@ class CornerTable:
             mask[first + random.permutation(size)[:some]] = True
         return self.keeping(mask)
 
-    def whitened(self, residuals: Floats) -> Floats:
-        """Residuals (N, 2) px over the standard deviations of the corners."""
-        return residuals if self.whitening is None else np.einsum("nij,nj->ni", self.whitening, residuals)
-
-    def weighted(self, factor: Floats) -> "CornerTable":
+    def weighted(self, factors: Floats) -> "CornerTable":
         """The same with each corner's whitened residual multiplied by a factor (N,)."""
-        whitening = np.eye(2) if self.whitening is None else self.whitening
-        return replace(self, whitening=factor[:, None, None] * whitening)
+        return replace(self, factors=factors)
 
     def split(self, mask: Mask) -> tuple[Mask, ...]:
         """A mask (N,) as one of each view."""
@@ -123,21 +171,14 @@ class CornerTable:
             begin = end
 
 
-def _whitening(detections: Sequence[Detection]) -> Floats:
-    """(N, 2, 2): by covariance; a corner without a usable one counts as the typical one of the others."""
-    covariances = np.concatenate(
-        [np.full((len(d), 2, 2), np.nan) if d.covariance is None else d.covariance for d in detections]
-    )
+def _typical_variance(detections: Sequence[Detection]) -> float:
+    """Px² the median over corners and axes; 1 where no corner has a usable covariance."""
+    known = [d.covariance[_usable(d.covariance)] for d in detections if d.covariance is not None]
+    diagonals = np.concatenate([np.empty((0, 2)), *(covariances[:, [0, 1], [0, 1]] for covariances in known)])
+    return float(np.median(diagonals)) if len(diagonals) else 1.0
+
+
+def _usable(covariances: Covariances) -> Mask:
+    """(N,) which are positive definite."""
     xx, xy, yy = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
-    with np.errstate(invalid="ignore"):
-        usable = (xx * yy - xy * xy > 0) & (xx > 0)
-    if not usable.all():
-        typical = np.median(covariances[usable][:, [0, 1], [0, 1]]) if usable.any() else 1.0
-        covariances[~usable] = typical * np.eye(2)
-    # the inverse of each Cholesky factor, in closed form, as LAPACK takes ten times as long for such small ones; and in
-    # the same memory
-    covariances[:, 1, 1] = 1.0 / np.sqrt(yy - xy * xy / xx)
-    covariances[:, 1, 0] = -xy / xx * yy
-    covariances[:, 0, 0] = 1.0 / np.sqrt(xx)
-    covariances[:, 0, 1] = 0.0
-    return covariances
+    return np.asarray((xx * yy - xy * xy > 0) & (xx > 0))

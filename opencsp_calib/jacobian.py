@@ -67,7 +67,7 @@ def residuals(lens: LensModel, table: CornerTable, estimate: Estimate) -> Floats
     for views in table.chunks():
         span = table.span(*views)
         points = _turned(table, estimate, views) + _shifts(table, estimate, views)
-        found[span] = lens.project(points.T, estimate.params) - table.pixels[span]
+        found[span] = lens.project(points.T, estimate.params) - table.pixels_of(*views)
     return found
 
 
@@ -116,18 +116,17 @@ def _fill(
     views: tuple[int, int],
 ) -> None:
     """Of a run of views, all at once."""
-    span = table.span(*views)
     cameras, shared = unknowns.camera.shape[1], unknowns.shared
     skipped = CORNER if len(unknowns.corners) else 0
     turned = _turned(table, estimate, views)
     points = turned + _shifts(table, estimate, views)
     pixels, by_point, by_params = lens.project_with_jacobians(points.T, estimate.params)
-    whitening = None if table.whitening is None else np.ascontiguousarray(table.whitening[span].transpose(1, 2, 0))
+    whitening = table.whitening(*views)
     rows = values[:, skipped:]
     by_shift = rows[:, -CORNER:]
     _whiten(whitening, by_point.transpose(1, 2, 0), by_shift)
     _whiten(whitening, _by_camera(by_params.transpose(1, 2, 0), unknowns), rows[:, :cameras])
-    _whiten(whitening, (pixels - table.pixels[span]).T, rows[:, shared])
+    _whiten(whitening, (pixels - table.pixels_of(*views)).T, rows[:, shared])
     for axis, (one, two) in enumerate(((1, 2), (2, 0), (0, 1))):
         rows[:, shared + 1 + axis] = turned[one] * by_shift[:, two] - turned[two] * by_shift[:, one]
     if skipped or shared > cameras:
@@ -136,15 +135,14 @@ def _fill(
             here = table.span(view, view + 1, since=views[0])
             by_board[:, :, here] = estimate.rotations[view].T @ by_shift[:, :, here]
         values[:, :skipped] = by_board[:, :skipped]
-        rows[:, cameras:shared] = np.einsum("ain,niw->awn", by_board, unknowns.warp[table.ids[span]])
+        rows[:, cameras:shared] = np.einsum("ain,niw->awn", by_board, unknowns.warp[table.ids_of(*views)])
 
 
 def split_by_view(table: CornerTable, unknowns: Unknowns, views: tuple[int, int], values: Floats) -> Iterator[ViewRows]:
     """The rows of a run of views (2, 3 + M + 7, n), one view after the other."""
-    ids = table.ids[table.span(*views)]
     first = (table.first[views[0] : views[1] + 1] - table.first[views[0]]).tolist()
     for view, begin, end in zip(range(*views), first, first[1:], strict=False):
-        yield ViewRows(view, _columns(ids[begin:end], unknowns.corners), values[:, :, begin:end])
+        yield ViewRows(view, _columns(table.detections[view].ids, unknowns.corners), values[:, :, begin:end])
 
 
 def _columns(ids: Ids, corners: Ids) -> Ids | slice:
@@ -174,7 +172,7 @@ def _whiten(whitening: Floats | None, rows: Floats, out: Floats) -> None:
 def _turned(table: CornerTable, estimate: Estimate, views: tuple[int, int]) -> Points:
     """(3, n) m: a run of views' corners, turned as the camera sees them but not yet shifted."""
     points = estimate.points.T
-    turned = [estimate.rotations[view] @ points[:, table.ids[table.span(view, view + 1)]] for view in range(*views)]
+    turned = [estimate.rotations[view] @ points[:, table.detections[view].ids] for view in range(*views)]
     return np.concatenate(turned, axis=1)
 
 

@@ -12,11 +12,12 @@ def test_whitening_inverts_the_covariance_and_fills_in_the_typical_one():
     known = Detection(np.arange(3), np.zeros((3, 2)), covariance)
     unknown = Detection(np.arange(2), np.zeros((2, 2)))
     table = CornerTable.of((known, unknown), "covariance")
-    information = table.whitening.transpose(0, 2, 1) @ table.whitening
+    whitening = table.whitening(0, 2).transpose(2, 0, 1)
+    information = whitening.transpose(0, 2, 1) @ whitening
     np.testing.assert_allclose(information[[0, 2]], np.linalg.inv(covariance[[0, 2]]), atol=1e-12)
     np.testing.assert_allclose(information[[1, 3, 4]], np.tile(np.eye(2) / 3.5, (3, 1, 1)), atol=1e-12)
     assert CornerTable.of((unknown,), "covariance").typical_weight == 1.0
-    assert CornerTable.of((known,), "equal").whitening is None
+    assert CornerTable.of((known,), "equal").whitening(0, 1) is None
 
 
 def test_table_keeps_corners_with_their_views():

@@ -42,8 +42,8 @@ def test_views_left_out_away_from_the_minimum_are_counted_from_where_all_lead(sh
     assert np.abs(camera_without_each_view(whole, ahead=ahead, tolerance=1e-2) / sigma - found / sigma).max() < 1e-2
     for view in (0, 7):
         rest = np.arange(12) != view
-        table = equations.table.keeping(rest[equations.table.view])
-        table = replace(table, first=np.delete(table.first, view + 1))
+        seen = tuple(detection for detection, kept in zip(equations.table.detections, rest, strict=True) if kept)
+        table = replace(equations.table, detections=seen)
         estimate = equations.estimate
         part = replace(estimate, rotations=estimate.rotations[rest], translations=estimate.translations[rest])
         step = factorise(linearise(equations.lens, table, part, equations.unknowns)).newton_step()
