@@ -14,7 +14,7 @@ __all__ = ["camera_without_each_view"]
 
 CG_TOLERANCE = 1e-6  # of each step's length in sigmas
 CG_STEPS = 200
-TOGETHER = 2**15  # numbers: as many views are left out at once as have so many unknowns
+TOGETHER = 2**16  # numbers: as many views are left out at once as have so many unknowns
 
 
 def camera_without_each_view(

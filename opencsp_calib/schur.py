@@ -26,7 +26,7 @@ from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["CornersKept", "Factorisation", "PosesKept", "factorise"]
 
-STRIP = 256  # rows of a product made at once: the whole would be as large as the matrix that it is for
+STRIP = 128  # rows of a product made at once: the whole would be as large as the matrix that it is for
 TOGETHER = 32  # views whose poses are eliminated at once: matrices large enough for BLAS
 
 
