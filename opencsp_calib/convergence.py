@@ -76,7 +76,7 @@ def remaining_sigmas(calibration: Calibration) -> float:
 
 
 def _remaining(equations: NormalEquations, factor: Factorisation, noise_px: float) -> float:
-    step = factor.newton_step()[0]
+    step = factor.step_without_poses()[: equations.unknowns.shared]
     variance = max(equations.cost / max(equations.dof, 1), noise_px**2)
     return float(np.sqrt(step @ np.linalg.solve(factor.shared_covariance, step) / variance))
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.jacobian import CORNER, ViewRows
-from opencsp_calib.normal_equations import NormalEquations, Parts
+from opencsp_calib.normal_equations import NormalEquations
 from opencsp_calib.schur import Factorisation
 from opencsp_calib.triangular import CholeskyRoot
 
@@ -18,7 +18,7 @@ TOGETHER = 2**16  # numbers: as many views are left out at once as have so many 
 
 
 def camera_without_each_view(
-    whole: Factorisation, *, ahead: Parts | None = None, tolerance: float = CG_TOLERANCE
+    whole: Factorisation, *, ahead: Floats | None = None, tolerance: float = CG_TOLERANCE
 ) -> Floats:
     """How the camera's parameters move when each view in turn is left out.
 
@@ -29,8 +29,8 @@ def camera_without_each_view(
     ----------
     whole : Factorisation
         Of all views, not damped.
-    ahead : Parts, optional
-        The step that all views together ask for; none where they are at their minimum.
+    ahead : (M + 3 C,), optional
+        The step that all views together ask for, without poses; none where they are at their minimum.
     tolerance : float
         What may be missing of each step, as a part of its length in sigmas, where it is iterated for.
 
@@ -42,9 +42,8 @@ def camera_without_each_view(
     unknowns = whole.equations.unknowns
     if not len(unknowns.corners):
         found = _directly(whole.equations)
-        return unknowns.of_camera(found if ahead is None else found - ahead[0])
-    start = None if ahead is None else np.concatenate([ahead[0], ahead[1].T.ravel()])
-    return unknowns.of_camera(_by_iteration(whole, start, tolerance))
+        return unknowns.of_camera(found if ahead is None else found - ahead)
+    return unknowns.of_camera(_by_iteration(whole, ahead, tolerance))
 
 
 def _directly(equations: NormalEquations) -> Floats:

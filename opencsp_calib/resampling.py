@@ -145,10 +145,10 @@ def half_steps(equations: NormalEquations) -> Floats:
         If a half does not determine the camera.
     """
     try:
-        shared = [factorise(equations.keeping(half)).newton_step()[0] for half in HALVES]
+        steps = [factorise(equations.keeping(half)).step_without_poses() for half in HALVES]
     except np.linalg.LinAlgError as error:
         raise CalibrationFailedError(f"half of the views do not determine the camera ({error})") from None
-    return equations.unknowns.of_camera(np.array(shared))
+    return np.array([equations.unknowns.of_camera(step) for step in steps])
 
 
 def held_out(pairs: tuple[tuple[Observations, Observations], ...], solve: Solve) -> HeldOut:

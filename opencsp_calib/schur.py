@@ -69,6 +69,10 @@ class Factorisation(ABC):
         """By how much the unknowns move to where the sum of squares is least, as far as it is a quadratic form."""
 
     @abstractmethod
+    def step_without_poses(self) -> Floats:
+        """(M + 3 C,) of the Newton step all but the poses, in the order of `solve_without_poses`."""
+
+    @abstractmethod
     def solve_without_poses(self, right: Floats) -> Floats:
         """Solutions (M + 3 C, R) for right-hand sides from which the poses are eliminated.
 
@@ -131,6 +135,11 @@ class PosesKept(Factorisation):
         dense, inner = self._solved(-np.concatenate([pose.ravel(), shared]), -corner.T)
         return dense[pose.size :], inner.T, dense[: pose.size].reshape(pose.shape)
 
+    def step_without_poses(self) -> Floats:
+        """See `Factorisation.step_without_poses`."""
+        shared, corner, _ = self.newton_step()
+        return np.concatenate([shared, corner.T.ravel()])
+
     def solve_without_poses(self, right: Floats) -> Floats:
         """See `Factorisation.solve_without_poses`."""
         right = np.ascontiguousarray(right)  # whose columns one after the other would take five times as long
@@ -182,13 +191,17 @@ class CornersKept(Factorisation):
     def newton_step(self) -> Parts:
         """See `Factorisation.newton_step`."""
         equations, roots = self.equations, self.inverse_roots
-        corners, shared = np.split(self._dense(-self.gradient), [equations.corner_gradient.size])
+        shared, corners = np.split(self.step_without_poses(), [equations.unknowns.shared])
         corners = corners.reshape(CORNER, len(equations.corner))
         pose = -equations.pose_gradient - shared @ equations.shared_pose
         for rows in equations.rows():
             moved = (rows.corner * corners[:, rows.columns]).sum(axis=1)
             pose[rows.view] -= (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
         return shared, corners.T, (roots.transpose(0, 2, 1) @ (roots @ pose[:, :, None]))[:, :, 0]
+
+    def step_without_poses(self) -> Floats:
+        """See `Factorisation.step_without_poses`."""
+        return np.roll(self._dense(-self.gradient), self.equations.unknowns.shared)
 
     def solve_without_poses(self, right: Floats) -> Floats:
         """See `Factorisation.solve_without_poses`."""

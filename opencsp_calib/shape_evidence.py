@@ -112,9 +112,9 @@ def evidence_of(given: Calibration, shape: SolveOptions) -> Evidence:
 def _move(flat: NormalEquations, free: NormalEquations) -> tuple[Params, Floats]:
     """A step (P,) of the camera towards the board's shape; (V, P) how each view, left out, changes it from none."""
     solved = factorise(free)  # with many views the largest thing in memory: gone before the halves have theirs
-    step = solved.newton_step()
+    step = solved.step_without_poses()
     left_out = camera_without_each_view(solved, ahead=step, tolerance=CLOSE)
-    return free.unknowns.of_camera(step[0]), left_out - camera_without_each_view(factorise(flat))
+    return free.unknowns.of_camera(step), left_out - camera_without_each_view(factorise(flat))
 
 
 def _between(halves: Floats) -> Params:

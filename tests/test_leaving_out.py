@@ -36,7 +36,7 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
 def test_views_left_out_away_from_the_minimum_are_counted_from_where_all_lead(shape):
     equations = Dense(world(12, SolveOptions(board_shape=shape))).equations
     whole = factorise(equations)
-    ahead = whole.newton_step()
+    ahead = whole.step_without_poses()
     sigma = np.sqrt(np.diag(whole.camera_covariance))
     found = camera_without_each_view(whole, ahead=ahead)
     assert np.abs(camera_without_each_view(whole, ahead=ahead, tolerance=1e-2) / sigma - found / sigma).max() < 1e-2
@@ -47,5 +47,5 @@ def test_views_left_out_away_from_the_minimum_are_counted_from_where_all_lead(sh
         estimate = equations.estimate
         part = replace(estimate, rotations=estimate.rotations[rest], translations=estimate.translations[rest])
         step = factorise(linearise(equations.lens, table, part, equations.unknowns)).newton_step()
-        expected = equations.unknowns.of_camera(step[0] - ahead[0])
+        expected = equations.unknowns.of_camera(step[0] - ahead[: len(step[0])])
         assert np.abs((found[view] - expected) / sigma).max() < 1e-5
