@@ -17,7 +17,7 @@ from opencsp_calib.board import Board
 from opencsp_calib.coach import Knowledge, learn
 from opencsp_calib.errors import CalibError
 from opencsp_calib.looking import Search
-from opencsp_calib.processes import own_process
+from opencsp_calib.processes import BACKGROUND, own_process
 
 __all__ = ["Learner"]
 
@@ -36,7 +36,10 @@ class Learner:
     def __init__(self, search: Search, image_size: tuple[int, int], range_m: float | None, goal_px: float) -> None:
         self._search = search
         self._process = subprocess.Popen(  # noqa: S603  # our own module
-            own_process("opencsp_calib.capture.learning"), stdin=subprocess.PIPE, stdout=subprocess.PIPE
+            own_process("opencsp_calib.capture.learning", background=True),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            **BACKGROUND,
         )
         self._waiting = ThreadPoolExecutor(1, thread_name_prefix="learn")
         self._running: Future[Knowledge] | None = None

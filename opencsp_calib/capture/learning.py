@@ -5,9 +5,7 @@ stops with its standard input, so that it never outlives the capture.
 """
 
 import copyreg
-import os
 import pickle
-import signal
 import sys
 from collections.abc import Sequence
 from functools import partial
@@ -23,6 +21,7 @@ from opencsp_calib.errors import InputError
 from opencsp_calib.images import ImageFile, read_encoded
 from opencsp_calib.looking import Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
+from opencsp_calib.processes import answers
 
 __all__ = ["Study", "main"]
 
@@ -62,10 +61,7 @@ class Study:
 
 def main() -> None:
     """Answer until standard input ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the process that started this one
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a library that prints must not garble the answers
-    asked = sys.stdin.buffer
+    asked, told = sys.stdin.buffer, answers("wb")
     copyreg.pickle(MappingProxyType, _pickled)
     with threadpool_limits(1), opencv_on_one_thread():
         study = Study(*pickle.load(asked))  # noqa: S301  # from the process that started this one
@@ -79,8 +75,8 @@ def main() -> None:
                 answer = study.of(photographs)
             except Exception as error:
                 answer = error
-            pickle.dump(answer, answers)
-            answers.flush()
+            pickle.dump(answer, told)
+            told.flush()
 
 
 def _pickled(mapping: MappingProxyType[Any, Any]) -> tuple[Any, ...]:

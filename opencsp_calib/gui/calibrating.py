@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from nicegui import ui
 
-from opencsp_calib.gui.choosing import fill, photograph_table
+from opencsp_calib.gui.choosing import PhotographTable
 from opencsp_calib.gui.controls import action, quiet_action
 from opencsp_calib.gui.procedure import calibrate, put_back, remove
 from opencsp_calib.gui.session import Session
@@ -39,14 +39,14 @@ def build(page: "Page") -> Callable[[], None]:
         quiet_action("Show reprojection error", lambda: page.show_result("Reprojection error"), "reprojection-error"),
         quiet_action("Visualize distortion", lambda: page.show_result("Distortion"), "visualize-distortion"),
     ]
-    worst = photograph_table(page, COLUMNS).props("data-testid=worst-images").classes("worst")
+    worst = PhotographTable(page, COLUMNS).props("data-testid=worst-images").classes("worst")
     change = _changing(page)
 
     def refresh() -> None:
         solved = session.calibration
         solve.set_enabled(session.can_calibrate)
         rms.set_text(f"{solved.rms_px:.4f} px" if solved else "not yet known")
-        fill(page, worst, _worst(session))
+        worst.fill(_worst(session))
         worst.set_visibility(solved is not None)
         for look in looks:
             look.set_enabled(solved is not None)

@@ -21,18 +21,18 @@ from opencsp_calib.capture import Prepared, State, prepared, settings_from
 from opencsp_calib.coach.wording import described
 from opencsp_calib.errors import CalibError
 from opencsp_calib.images import encode_thumbnail
+from opencsp_calib.processes import answers
 
 __all__ = ["frame_as_json", "main"]
 
 
 def main() -> None:
     """Run one capture."""
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a library that prints must not garble the answers
+    told = answers("w")
 
     def tell(answer: dict[str, Any]) -> None:
-        answers.write(json.dumps(answer) + "\n")
-        answers.flush()
+        told.write(json.dumps(answer) + "\n")
+        told.flush()
 
     asked = json.loads(sys.stdin.readline())
     shown_px = asked.pop("shown_px")

@@ -1,49 +1,33 @@
-"""Which photographs are selected in a table, shared by all tables of the page."""
+"""Tables of photographs; which of them are selected is shared by all tables of the page."""
 
 from typing import TYPE_CHECKING, Any
 
-from nicegui import ui
+from nicegui.element import Element
+from nicegui.events import GenericEventArguments
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
-__all__ = ["fill", "photograph_table"]
-
-NAME_CELL = (
-    '<q-td :props="props"><a class="name" href="#" role="button" '
-    "@click.stop.prevent=\"$parent.$emit('look', props.row.image)\">{{ props.row.image }}</a></q-td>"
-)
+__all__ = ["PhotographTable"]
 
 
-def photograph_table(page: "Page", columns: list[dict[str, Any]]) -> ui.table:
-    """A table whose rows are photographs: a click selects one, one on its name opens it."""
+class PhotographTable(Element, component="photograph_table.js"):
+    """A table whose rows are photographs; see the component."""
 
-    def selected() -> None:
-        here = {row["image"] for row in table.rows}
-        page.selected = (page.selected - here) | {row["image"] for row in table.selected}
-        page.refresh()
+    def __init__(self, page: "Page", columns: list[dict[str, Any]]) -> None:
+        super().__init__()
+        self._page = page
+        self._props.update(columns=columns, rows=[], selected=[])
+        self.on("select", self._select).on("look", lambda event: page.look_at(event.args))
 
-    def clicked(event: Any) -> None:
-        page.selected ^= {event.args[1]["image"]}
-        page.refresh()
+    def fill(self, rows: list[dict[str, Any]]) -> None:
+        """Show rows, and which of them are selected."""
+        chosen = [row["image"] for row in rows if row["image"] in self._page.selected]
+        for name, value in (("rows", rows), ("selected", chosen)):
+            if self._props[name] != value:
+                self.props[name] = value
 
-    table = ui.table(
-        columns=columns,
-        rows=[],
-        row_key="image",
-        selection="multiple",
-        pagination={"rowsPerPage": 0},
-        on_select=selected,
-    )
-    table.add_slot("body-cell-image", NAME_CELL)
-    table.on("rowClick", clicked).on("look", lambda event: page.look_at(event.args))
-    return table.props("flat dense hide-bottom")
-
-
-def fill(page: "Page", table: ui.table, rows: list[dict[str, Any]]) -> None:
-    """Show rows, and which of them are selected."""
-    if rows != table.rows:
-        table.rows = rows
-    chosen = [row for row in rows if row["image"] in page.selected]
-    if chosen != table.selected:
-        table.selected = chosen
+    def _select(self, event: GenericEventArguments) -> None:
+        here = {row["image"] for row in self._props["rows"]}
+        self._page.selected = (self._page.selected - here) | set(event.args)
+        self._page.refresh()

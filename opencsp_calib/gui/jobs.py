@@ -12,30 +12,30 @@ import threading
 import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any, TextIO, TypeAlias
+from typing import IO, Any, TypeAlias
 
 from opencsp_calib.errors import CalibError
+from opencsp_calib.processes import answers
 
 Tell: TypeAlias = Callable[[dict[str, Any]], None]
 
 
 def main() -> None:
     """Do one job after another until standard input ends."""
-    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
-    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # a library that prints must not garble the answers
+    told = answers("w")
     asked: queue.Queue[dict[str, Any]] = queue.Queue()
     threading.Thread(target=_listen, args=(asked,), daemon=True).start()
     _load()
     while True:
         request = asked.get()
         try:
-            done = JOBS[request.pop("job")](lambda answer: _tell(answers, answer), **request)
-            _tell(answers, {"done": done})
+            done = JOBS[request.pop("job")](lambda answer: _tell(told, answer), **request)
+            _tell(told, {"done": done})
         except CalibError as error:
-            _tell(answers, {"error": str(error), "exit_code": error.exit_code})
+            _tell(told, {"error": str(error), "exit_code": error.exit_code})
         except Exception as error:  # a defect: told, and the window lives on
             traceback.print_exc()
-            _tell(answers, {"error": f"unexpected: {error!r}", "exit_code": 1})
+            _tell(told, {"error": f"unexpected: {error!r}", "exit_code": 1})
 
 
 def _listen(asked: "queue.Queue[dict[str, Any]]") -> None:
@@ -45,9 +45,7 @@ def _listen(asked: "queue.Queue[dict[str, Any]]") -> None:
 
 
 def _load() -> None:
-    """Load beforehand what a job will need; and leave the page what it needs of the processor."""
-    if hasattr(os, "nice"):
-        os.nice(10)
+    """Load beforehand what a job will need."""
     from opencsp_calib import pipeline  # noqa: F401
     from opencsp_calib.registry import installed
 
@@ -55,9 +53,9 @@ def _load() -> None:
         solver.missing()
 
 
-def _tell(answers: TextIO, answer: dict[str, Any]) -> None:
-    answers.write(json.dumps(answer) + "\n")
-    answers.flush()
+def _tell(told: IO[str], answer: dict[str, Any]) -> None:
+    told.write(json.dumps(answer) + "\n")
+    told.flush()
 
 
 def find_corners(

@@ -51,14 +51,15 @@ def _incoming(router: APIRouter, session: Session) -> None:
 
 
 def _outgoing(router: APIRouter, session: Session) -> None:
-    at_once = asyncio.Semaphore(2)  # photographs in memory
+    # one of each at a time: few photographs in memory, and a whole one does not wait for thumbnails
+    small, whole = asyncio.Semaphore(1), asyncio.Semaphore(1)
 
     @router.get("/photographs")
     async def give(image: str, side: int = THUMBNAIL_PX) -> Response:
         path = session.selection.path_of(image)
         if path is None:
             raise HTTPException(404)
-        async with at_once:
+        async with whole if side > THUMBNAIL_PX else small:
             try:
                 data = await asyncio.to_thread(_picture, path, side, session.own / "thumbnails")
             except (CalibError, OSError) as error:

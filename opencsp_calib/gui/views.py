@@ -6,7 +6,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from opencsp_calib.gui.choosing import fill, photograph_table
+from opencsp_calib.gui.choosing import PhotographTable
 from opencsp_calib.gui.session import Session
 
 if TYPE_CHECKING:
@@ -25,7 +25,6 @@ COLUMNS: list[dict[str, Any]] = [
     {"name": "problems", "label": "To know", "field": "problems", "align": "left", "classes": "wide"},
 ]
 ROW_PX = 53
-PICTURE_CELL = '<q-td :props="props"><img class="thumbnail" loading="lazy" :src="props.row.picture" alt="" /></q-td>'
 START = (
     "Describe the board on the left and select about 50 photographs of it: tilted by 30 to 45 degrees to every side, "
     "half of them with the board turned by 90 degrees, together filling the whole image. Each photograph is listed "
@@ -36,15 +35,14 @@ START = (
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    table = photograph_table(page, COLUMNS).props("virtual-scroll data-testid=images").classes("views")
+    table = PhotographTable(page, COLUMNS).props("virtual-scroll data-testid=images").classes("views")
     table.props(f"virtual-scroll-item-size={ROW_PX}")  # else many more rows are drawn than can be seen
-    table.add_slot("body-cell-picture", PICTURE_CELL)
     empty = ui.label(START).classes("quiet empty")
 
     def refresh() -> None:
         names = [file.name for file in session.selection.files] or list(session.views)
         rms, dropped = _rms(session), _dropped(session)
-        fill(page, table, [_row(session, name, rms, dropped) for name in names])
+        table.fill([_row(session, name, rms, dropped) for name in names])
         table.set_visibility(bool(names))
         empty.set_visibility(not names)
 

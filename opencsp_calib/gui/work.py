@@ -6,18 +6,16 @@ second; what it is asked and what it answers are lines of JSON; large results ar
 
 import asyncio
 import json
-import subprocess
 from collections.abc import AsyncIterator, Mapping
 from contextlib import suppress
 from typing import Any, cast
 
 from opencsp_calib.errors import CalibError, CalibrationFailedError, CancelledError, InputError
-from opencsp_calib.processes import own_process
+from opencsp_calib.processes import BACKGROUND, own_process
 
 __all__ = ["Worker"]
 
 MAX_LINE = 2**26  # bytes of one answer
-PRIORITY: int = getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)  # of Windows; elsewhere jobs.py lowers its own
 
 
 class Worker:
@@ -31,11 +29,11 @@ class Worker:
         """Have the process ready."""
         if self._process is None or self._process.returncode is not None:
             self._process = await asyncio.create_subprocess_exec(
-                *own_process("opencsp_calib.gui.jobs"),
+                *own_process("opencsp_calib.gui.jobs", background=True),
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=MAX_LINE,
-                creationflags=PRIORITY,
+                **BACKGROUND,
             )
         return self._process
 
