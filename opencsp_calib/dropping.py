@@ -2,11 +2,10 @@
 
 from collections.abc import Iterable
 
-import numpy as np
-
 from opencsp_calib.calibration import LEAST_VIEWS, Calibration, Solve
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import InputError
+from opencsp_calib.quality import worst_views
 
 __all__ = ["drop_above", "drop_worst", "excluding"]
 
@@ -38,8 +37,7 @@ def drop_worst(calibration: Calibration, count: int, solve: Solve) -> Calibratio
     used = calibration.observations.used
     if count < 0 or len(used) - count < LEAST_VIEWS:
         raise InputError(f"cannot drop {count} of {len(used)} views: at least {LEAST_VIEWS} must be left")
-    worst = np.argsort(-calibration.view_rms_px)[:count]
-    return _without(calibration, [used[index].image for index in worst], solve)
+    return _without(calibration, [used[index].image for index in worst_views(calibration, count)], solve)
 
 
 def drop_above(calibration: Calibration, limit_px: float, solve: Solve) -> Calibration:

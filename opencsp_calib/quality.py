@@ -11,7 +11,7 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.convex_hull import convex_hull, hull_area, within_hull
 from opencsp_calib.detection import Observations
 
-__all__ = ["SetQuality", "ViewQuality", "correlations", "coverage", "set_quality", "view_qualities"]
+__all__ = ["SetQuality", "ViewQuality", "correlations", "coverage", "set_quality", "view_qualities", "worst_views"]
 
 COVERAGE_CELLS = 48  # along the longer side of the image
 
@@ -104,6 +104,11 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
             )
         )
     return tuple(results)
+
+
+def worst_views(calibration: Calibration, count: int = 5) -> tuple[int, ...]:
+    """Which of the used views have the largest rms, the worst first; those whose rms is not known come last."""
+    return tuple(np.argsort(-np.nan_to_num(calibration.view_rms_px), kind="stable")[:count].tolist())
 
 
 def set_quality(calibration: Calibration, views: Sequence[ViewQuality] = ()) -> SetQuality:

@@ -80,11 +80,12 @@ class CaptureFolder:
         InputError
             If it cannot be written, as where the disk is full; what was written before is untouched.
         """
+        taken = datetime.now(timezone.utc)  # before it is written, which may take a while
         path = self.path / f"{self._last_number() + 1:04d}.png"
         write_image(image.pixels, path)
         record = {
             "image": path.name,
-            "time": datetime.now(timezone.utc).isoformat(timespec="milliseconds"),
+            "time": taken.isoformat(timespec="milliseconds"),
             **self.about,
             "source_image": image.name,
             "source_sha256": image.sha256,

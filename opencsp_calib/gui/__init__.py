@@ -6,9 +6,10 @@
     guard.py     who may ask at all
     session.py   what has been chosen and found so far, kept in a folder in DIR
     offered.py   what plugins offer here
-    work.py      hands long work to jobs.py, which runs in a process of its own
+    work.py      hands long work to jobs.py, which runs in a process of its own;
+    live_capture.py does so with a capture, to capture_job.py
     files.py     which files may be touched             routes.py  photographs in, thumbnails and results out
-    page.py      the page; each of its sections is a file of its own
+    page.py      the page, and which file each of its sections is in
     *.js         the few elements that NiceGUI does not have; style.css, how all of it looks
 
 NiceGUI is imported here and nowhere else (extra ``gui``). The first page is there before what only results need, such

@@ -3,20 +3,19 @@
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from nicegui import ui
 
 from opencsp_calib.gui.choosing import PhotographTable
 from opencsp_calib.gui.controls import action, quiet_action
 from opencsp_calib.gui.procedure import calibrate, put_back, remove
 from opencsp_calib.gui.session import Session
+from opencsp_calib.quality import worst_views
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
 __all__ = ["build"]
 
-WORST = 5
 COLUMNS: list[dict[str, Any]] = [
     {"name": "image", "label": "The five worst", "field": "image", "align": "left"},
     {"name": "rms", "label": "rms (px)", "field": "rms"},
@@ -91,6 +90,5 @@ def _worst(session: Session) -> list[dict[str, Any]]:
     solved = session.calibration
     if solved is None:
         return []
-    order = np.argsort(-np.nan_to_num(solved.view_rms_px))[:WORST]
-    names = [view.image for view in solved.observations.used]
-    return [{"image": names[index], "rms": f"{solved.view_rms_px[index]:.4f}"} for index in order]
+    used, rms = solved.observations.used, solved.view_rms_px
+    return [{"image": used[index].image, "rms": f"{rms[index]:.4f}"} for index in worst_views(solved)]

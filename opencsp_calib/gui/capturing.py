@@ -7,9 +7,9 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from opencsp_calib.errors import InputError
-from opencsp_calib.gui.camera import SHOWN_PX, LiveCamera
 from opencsp_calib.gui.controls import action, choice, field, quiet_action
 from opencsp_calib.gui.files import within
+from opencsp_calib.gui.live_capture import SHOWN_PX, LiveCapture
 from opencsp_calib.gui.procedure import find_and_calibrate
 from opencsp_calib.gui.wording import worded
 from opencsp_calib.registry import installed
@@ -26,25 +26,25 @@ NOTHING = "data:image/svg+xml,<svg xmlns='http://www.w3.org/2000/svg' width='960
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
-    camera = page.session.camera
+    live = page.session.capture
     with ui.element("div").classes("columns capture"):
         with ui.element("div").classes("steps"):
-            refresh_controls = _controls(page, camera)
+            refresh_controls = _controls(page, live)
         with ui.element("main").classes("results live"):
-            refresh_picture = _picture(camera)
+            refresh_picture = _picture(live)
         with ui.element("div").classes("told"):
-            refresh_gauges = _gauges(camera)
+            refresh_gauges = _gauges(live)
 
     def refresh() -> None:
         refresh_controls()
         refresh_gauges()
         refresh_picture()
 
-    camera.changed.subscribe(refresh)
+    live.changed.subscribe(refresh)
     return refresh
 
 
-def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
+def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
     asked = {"source": "basler", "device": "", "release": "coach", "count": "50", "folder": "photographs", "set": ""}
 
     def take(name: str) -> Callable[[str], None]:
@@ -61,7 +61,7 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         except InputError as error:
             page.session.say(str(error), "bad")
             return
-        await camera.start(
+        await live.start(
             folder=str(folder),
             board=page.session.settings.spec,
             source=asked["source"],
@@ -79,7 +79,7 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
 
     def on_key(event: KeyEventArguments) -> None:
         if event.action.keydown and not event.action.repeat and event.key.space and page.tab == "Capture":
-            camera.order("press")
+            live.order("press")
 
     ui.keyboard(on_key=on_key)
     with ui.element("section").classes("step"):
@@ -93,23 +93,23 @@ def _controls(page: "Page", camera: LiveCamera) -> Callable[[], None]:
         settings = ui.textarea("Camera settings", on_change=lambda e: asked.update(set=e.value)).classes("field")
         settings.props('outlined dense autogrow data-testid=capture-settings placeholder="FEATURE=VALUE, one a line"')
         begin = action("Start", start, "capture-start")
-        end = quiet_action("Stop", lambda: camera.order("stop"), "capture-stop")
+        end = quiet_action("Stop", lambda: live.order("stop"), "capture-stop")
         with ui.element("div").classes("side-by-side"):
-            press = quiet_action("Release", lambda: camera.order("press"), "capture-release-now")
-            delete = quiet_action("Delete last", lambda: camera.order("delete"), "capture-delete")
+            press = quiet_action("Release", lambda: live.order("press"), "capture-release-now")
+            delete = quiet_action("Delete last", lambda: live.order("delete"), "capture-delete")
         keys = ui.label("The space bar releases too.").classes("hint")
         on = action("Calibrate these", lambda: page.attempt(calibrate), "capture-calibrate")
 
     def refresh() -> None:
-        begin.set_visibility(not camera.running)
+        begin.set_visibility(not live.running)
         missing = known[asked["source"]].missing() if asked["source"] in known else "no installed plugin provides it"
         lacking.set_text(f"{asked['source']}: {missing}" if missing else "")
         lacking.set_visibility(missing is not None)
         begin.set_enabled(page.session.settings.is_complete and missing is None)
         for shown in (end, press, delete, keys):
-            shown.set_visibility(camera.running)
-        taken = bool(camera.frame and camera.frame["taken"])
-        on.set_enabled(taken and not camera.running and not page.session.busy)
+            shown.set_visibility(live.running)
+        taken = bool(live.frame and live.frame["taken"])
+        on.set_enabled(taken and not live.running and not page.session.busy)
 
     return refresh
 
@@ -120,7 +120,7 @@ def _number(text: str) -> int:
     return int(text)
 
 
-def _gauges(camera: LiveCamera) -> Callable[[], None]:
+def _gauges(live: LiveCapture) -> Callable[[], None]:
     with ui.element("div") as told:
         with ui.element("section").classes("step"):
             table = ui.html(sanitize=True).classes("gauges").props("data-testid=capture-gauges")
@@ -131,7 +131,7 @@ def _gauges(camera: LiveCamera) -> Callable[[], None]:
             missing = ui.label().classes("hint missing").props("data-testid=capture-missing")
 
     def refresh() -> None:
-        frame = camera.frame
+        frame = live.frame
         told.set_visibility(frame is not None)
         if frame is None:
             return
@@ -149,16 +149,16 @@ def _row(name: str, state: str, value: str) -> str:
     return f'<div class="gauge {state}"><b>{MARKS[state]}</b><span>{name}</span><span>{value}</span></div>'
 
 
-def _picture(camera: LiveCamera) -> Callable[[], None]:
+def _picture(live: LiveCapture) -> Callable[[], None]:
     advice = ui.label().classes("advice").props("data-testid=capture-advice role=status aria-live=polite")
     picture = ui.interactive_image(NOTHING, cross=False, sanitize=False).classes("live-picture")
     picture.props("data-testid=capture-picture")
     said = ui.label().props("data-testid=capture-message")
 
     def refresh() -> None:
-        said.set_text(worded(camera.message.text))
-        said.classes(replace=f"status {camera.message.level}")
-        frame = camera.frame
+        said.set_text(worded(live.message.text))
+        said.classes(replace=f"status {live.message.level}")
+        frame = live.frame
         if frame is None:
             advice.set_text("")
             return

@@ -1,6 +1,6 @@
 """The page: header, the steps on the left in the order of use, what was found on the right, the status below.
 
-How a section is added: write a file with one function ``build(page)`` that makes its elements and returns a function
+How a section is added: write a file with a function ``build(page)`` that makes its elements and returns a function
 without arguments which brings them up to date with ``page.session``; it is called whenever the session changes. Put it
 into `STEPS` (left), `RESULTS` (right, shown one at a time) or `TABS` (a tab of its own beside Calibrate) below; what is
 in the last two is built when it is first shown. A section changes nothing itself: it calls a method of the session,
@@ -17,22 +17,19 @@ from opencsp_calib.errors import CalibError
 from opencsp_calib.gui import (
     about,
     board_fields,
-    board_shape,
     calibrating,
     capturing,
     corners,
     cross_validation,
-    distortion,
     existing,
     fleets,
     photographs,
     poses,
     printing,
+    report_sections,
     reprojection,
-    result,
     saving,
     status,
-    uncertainty,
     viewer,
     views,
 )
@@ -53,12 +50,12 @@ STEPS: tuple[tuple[str, Build], ...] = (
 RESULTS: tuple[tuple[str, Build], ...] = (
     ("Photographs", views.build),
     ("Found corners", viewer.build),
-    ("Result", result.build),
+    ("Result", report_sections.result),
     ("Reprojection error", reprojection.build),
-    ("Distortion", distortion.build),
+    ("Distortion", report_sections.distortion),
     ("Poses", poses.build),
-    ("Board shape", board_shape.build),
-    ("Uncertainty", uncertainty.build),
+    ("Board shape", report_sections.board_shape),
+    ("Uncertainty", report_sections.uncertainty),
     ("Cross-validation", cross_validation.build),
 )
 TABS: tuple[tuple[str, Build], ...] = (

@@ -9,13 +9,12 @@ from nicegui.events import EChartPointClickEventArguments
 
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.gui.drawn import of_calibration
+from opencsp_calib.quality import worst_views
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
 __all__ = ["build"]
-
-WORST = 5
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -58,7 +57,7 @@ def _residuals(calibration: Calibration) -> str:
 def _bars(calibration: Calibration) -> dict[str, Any]:
     names = [view.image for view in calibration.observations.used]
     rms = calibration.view_rms_px
-    worst = set(np.argsort(-np.nan_to_num(rms))[:WORST].tolist())
+    worst = worst_views(calibration)
     bars = [
         {"value": float(value) if np.isfinite(value) else None, "itemStyle": {"color": WORSE if n in worst else FAIR}}
         for n, value in enumerate(rms)
@@ -82,7 +81,13 @@ def _bars(calibration: Calibration) -> dict[str, Any]:
                 "type": "bar",
                 "data": bars,
                 "barMaxWidth": 40,
-                "markLine": {"symbol": "none", "data": [line], "lineStyle": {"color": QUIET}, "silent": True},
+                "markLine": {
+                    "data": [line],
+                    "precision": 6,
+                    "symbol": "none",
+                    "lineStyle": {"color": QUIET},
+                    "silent": True,
+                },
             }
         ],
     }

@@ -29,8 +29,8 @@ from opencsp_calib.atomic import replacing
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibError, InputError
-from opencsp_calib.gui.camera import LiveCamera
 from opencsp_calib.gui.files import shown
+from opencsp_calib.gui.live_capture import LiveCapture
 from opencsp_calib.gui.news import Level, Message, Progress
 from opencsp_calib.gui.offered import Offered
 from opencsp_calib.gui.selection import Selection
@@ -61,7 +61,7 @@ class Session:
         self.own = self.folder / FOLDER
         self.changed: Event[[]] = Event()
         self.worker = Worker()
-        self.camera = LiveCamera()
+        self.capture = LiveCapture()
         self.offered: Offered | None = None
         self.settings = Settings()
         self.selection = Selection(self.folder, self.own / "photographs")
@@ -174,7 +174,7 @@ class Session:
         """Keep all, and end the work."""
         self.keep()
         self.worker.stop()
-        self.camera.close()
+        self.capture.close()
 
     def _tell_now(self) -> None:
         self._news = None

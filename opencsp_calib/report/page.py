@@ -9,7 +9,7 @@ import numpy as np
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.comparison import compare
 from opencsp_calib.judgement import REMARKS, conclusion, judge
-from opencsp_calib.quality import set_quality, view_qualities
+from opencsp_calib.quality import set_quality, view_qualities, worst_views
 from opencsp_calib.report import plots
 from opencsp_calib.report.board_section import board_section
 from opencsp_calib.report.document import write_document
@@ -132,7 +132,7 @@ def parameters(calibration: Calibration) -> str:
 
 def _views_in_order(calibration: Calibration) -> str:
     qualities = view_qualities(calibration)
-    worst = sorted(qualities, key=lambda view: -np.nan_to_num(view.rms_px))[:5]
+    worst = [qualities[index] for index in worst_views(calibration)]
     rows = [(v.image, f"{v.rms_px:.4f}", f"{v.tilt_deg:.1f}", f"{v.range_m:.3f}", v.orientation) for v in worst]
     return (
         "<h2>Each view, in order of capture</h2>"

@@ -9,7 +9,7 @@ from opencsp_calib.arrays import Floats, Params, Pixels
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference
-from opencsp_calib.quality import correlations
+from opencsp_calib.quality import correlations, worst_views
 from opencsp_calib.report.figures import ACCENT, COLOURS, image_axes, new_figure, save_figure
 
 if TYPE_CHECKING:
@@ -36,8 +36,7 @@ def rms_plot(calibration: Calibration) -> "Figure":
     """Rms of each used view, in order of capture; the five worst stand out."""
     figure, (axes,) = new_figure(8, 2.6)
     rms = calibration.view_rms_px
-    worst = np.argsort(-np.nan_to_num(rms))[:5]
-    colours = np.where(np.isin(np.arange(len(rms)), worst), "#c8553d", ACCENT)
+    colours = np.where(np.isin(np.arange(len(rms)), worst_views(calibration)), "#c8553d", ACCENT)
     axes.bar(np.arange(len(rms)), rms, color=colours)
     axes.axhline(calibration.rms_px, color="black", linewidth=0.8, linestyle="--", label="all views")
     names = [view.image for view in calibration.observations.used]

@@ -14,8 +14,22 @@ from opencsp_calib.images import write_image
 pytestmark = pytest.mark.timeout(1200)
 
 
+def line_in_the_chart(window: Window) -> float:
+    """The rms at which the line across the bars is drawn, by where its label stands; 0 before it is there."""
+    script = """
+        const bars = document.querySelector(".bars"), box = (element) => element.getBoundingClientRect();
+        const label = [...bars.querySelectorAll("text")].find((text) => `${text.textContent} px` === arguments[0]);
+        const middle = label && box(label).y + box(label).height / 2 - box(bars).y;
+        return label ? getElement(Number(bars.id.slice(1))).chart.convertFromPixel({ yAxisIndex: 0 }, middle) : 0;
+    """
+    return float(window.browser.execute_script(script, window.rms))
+
+
 def test_put_back_is_as_before(calibrated: Window) -> None:
     rms = calibrated.rms
+    calibrated.click("reprojection-error")
+    drawn = calibrated.until(lambda: line_in_the_chart(calibrated))
+    assert drawn == pytest.approx(float(rms.split()[0]), rel=0.05)
     calibrated.tick("worst-images", 1)
     calibrated.press("Remove and recalibrate")
     calibrated.until(lambda: "from 11 views" in calibrated.status)

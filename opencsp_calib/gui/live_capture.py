@@ -10,7 +10,7 @@ from nicegui import Event
 from opencsp_calib.gui.news import Message
 from opencsp_calib.processes import own_process
 
-__all__ = ["SHOWN_PX", "LiveCamera"]
+__all__ = ["SHOWN_PX", "LiveCapture"]
 
 SHOWN_PX = 960
 """The longer side of the live picture."""
@@ -21,7 +21,7 @@ NEXT = (
 )
 
 
-class LiveCamera:
+class LiveCapture:
     """Starts a capture, hands orders to it, and keeps what it last told."""
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class LiveCamera:
         self._begun, self.frame, self.message = True, None, Message("Starting the camera …")
         self.changed.emit()
         self._process = await asyncio.create_subprocess_exec(
-            *own_process("opencsp_calib.gui.camera_job"),
+            *own_process("opencsp_calib.gui.capture_job"),
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             limit=MAX_LINE,

@@ -1,4 +1,4 @@
-"""A capture in a process of its own, started by `camera.py`.
+"""A capture in a process of its own, started by `live_capture.py`.
 
 The first line of standard input says, as JSON, what to capture; each further one is ``press``, ``delete`` or ``stop``.
 Each line of standard output is JSON: a frame with all there is to show of it, something said, what came of it at last,
