@@ -18,7 +18,8 @@ def line_in_the_chart(window: Window) -> float:
     """The rms at which the line across the bars is drawn, by where its label stands; 0 before it is there."""
     script = """
         const bars = document.querySelector(".bars"), box = (element) => element.getBoundingClientRect();
-        const label = [...bars.querySelectorAll("text")].find((text) => `${text.textContent} px` === arguments[0]);
+        const texts = [...(bars?.querySelectorAll("text") ?? [])];
+        const label = texts.find((text) => `${text.textContent} px` === arguments[0]);
         const middle = label && box(label).y + box(label).height / 2 - box(bars).y;
         return label ? getElement(Number(bars.id.slice(1))).chart.convertFromPixel({ yAxisIndex: 0 }, middle) : 0;
     """
