@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from gui_window import Server, Window
+from gui_window import PATIENCE_S, Server, Window
 
 
 @pytest.fixture(scope="session")
@@ -46,6 +46,7 @@ def chromium() -> Iterator[Any]:
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
         started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
         started.downloads = downloads
+        started.set_script_timeout(PATIENCE_S)
         started.set_window_size(1280, 720 + 720 - started.execute_script("return innerHeight"))
         yield started
         started.quit()
