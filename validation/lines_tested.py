@@ -4,8 +4,8 @@ Claim: tests run more than 95 % of the lines of the core (`opencsp_calib/`), and
 
 Way: all tests (or those named as arguments) with coverage.py, which also watches the processes that tests start: the
 window, its workers, the coach, command lines. Left out is the part in C, into which it cannot look; tests compare what
-it computes with truth. Lines that no test ran are listed with what stands in them; excuses are written by hand above the
-figures.
+it computes with truth. Lines that no test ran are listed with what stands in them; excuses are written by hand above
+the figures.
 """
 
 import json
