@@ -150,9 +150,7 @@ def check(
     camera: Camera,
     observations: Observations,
     solve: Solve,
-    *,
-    covariance: Matrix | None = None,
-    solved_board: Board | None = None,
+    known: Calibration | None = None,
 ) -> Check:
     """Hold a camera against new photographs.
 
@@ -164,10 +162,9 @@ def check(
         Of the photographs.
     solve : callable
         Makes the fresh calibration; its lens model may be another.
-    covariance : (P, P), optional
-        Of the camera checked, where it is known: its uncertainty explains a part of the difference.
-    solved_board : Board, optional
-        As it was solved together with the camera checked.
+    known : Calibration, optional
+        Which the camera checked is from: its uncertainty explains a part of the difference, and the board as solved
+        with it may explain the photographs.
 
     Raises
     ------
@@ -179,13 +176,13 @@ def check(
     if camera.image_size != observations.image_size:
         sizes = " but the camera is for ".join(f"{w}x{h}" for w, h in (observations.image_size, camera.image_size))
         raise InputError(f"the photographs are {sizes}: they are not from this camera, or were resized")
-    fresh = _solved_with(solved_board, observations, solve)
+    fresh = _solved_with(known.board if known else None, observations, solve)
     if not np.isfinite(fresh.covariance).all():
         fresh = with_uncertainty(fresh)
     if not np.isfinite(fresh.covariance).all():
         said = fresh.problems[-1].message if fresh.problems else "its uncertainty is not known"
         raise CalibrationFailedError(f"no fresh solution to check against: {said}")
-    at_range, at_infinity = judged(camera, fresh, covariance)
+    at_range, at_infinity = judged(camera, fresh, known.covariance if known else None)
     return Check(camera, fresh, at_range, at_infinity, _view_rms(camera, fresh))
 
 

@@ -75,6 +75,11 @@ def test_between_two_and_five_sigmas_it_is_degraded() -> None:
     assert 2 < middling.decisive.sigmas < 5
 
 
+def known_with(**change: object) -> Calibration:
+    """A calibration made before, in which something is as given."""
+    return replace(solve(photographed()), **change)
+
+
 def verdict_of(rms_px: float, worst_px: float, predicted_px: float) -> str:
     """Of figures by hand: a shift of the given rms and maximum."""
     shift = np.zeros((1, 101, 2))
@@ -96,24 +101,25 @@ def test_the_rule() -> None:
 def test_the_uncertainty_of_the_camera_itself_counts_where_it_is_known() -> None:
     covariance = np.diag(np.array([1.0, 1.0, 1.0, 1.0, 0.01, 0.01, 1e-4, 1e-4]) ** 2)
     alone = check(changed(k1=0.004), photographed(noise_px=0.02), solve)
-    known = check(changed(k1=0.004), photographed(noise_px=0.02), solve, covariance=covariance)
+    known = check(changed(k1=0.004), photographed(noise_px=0.02), solve, known_with(covariance=covariance))
     assert known.decisive.predicted_px > 3 * alone.decisive.predicted_px
     assert (alone.verdict, known.verdict) == ("wrong", "ok")
 
 
 def test_a_bent_board_does_not_make_a_good_camera_wrong_where_its_shape_was_solved_for() -> None:
     bent, poses = bowed(BOARD, 0.002), seed_poses(BOARD, CAMERA, 6, 4)
+    known = known_with(board=bent)
     few = observe(CAMERA, bent, poses, noise_px=0.05, rng=4, nominal=BOARD)
     assert check(CAMERA, few, solve).verdict != "ok"
-    found = check(CAMERA, few, solve, solved_board=bent)
+    found = check(CAMERA, few, solve, known)
     assert found.verdict == "ok"
     assert "board-solved-before" in {problem.code for problem in found.problems}
-    assert check(changed(fx=13.5, fy=13.5), few, solve, solved_board=bent).verdict == "wrong"
-    flat = check(CAMERA, photographed(), solve, solved_board=bent)  # of another board
+    assert check(changed(fx=13.5, fy=13.5), few, solve, known).verdict == "wrong"
+    flat = check(CAMERA, photographed(), solve, known)  # of another board
     assert flat.fresh.board.points is not bent.points
     assert flat.verdict == "ok"
     larger = Checkerboard(9, 6, 0.2)
-    assert check(CAMERA, photographed(), solve, solved_board=bowed(larger, 0.002)).verdict == "ok"
+    assert check(CAMERA, photographed(), solve, known_with(board=bowed(larger, 0.002))).verdict == "ok"
 
 
 def test_what_it_says() -> None:

@@ -67,13 +67,7 @@ def check(
     known = camera_in(camera, name, image_size)
     calibration = calibration_in(camera)
     observations = _observed(images, board, jobs, calibration.observations.board if calibration else None)
-    found = checked(
-        known,
-        observations,
-        lambda views: pipeline.solve(views, known.model),
-        covariance=calibration.covariance if calibration else None,
-        solved_board=calibration.board if calibration else None,
-    )
+    found = checked(known, observations, lambda views: pipeline.solve(views, known.model), calibration)
     say(f"{known.name}: {found.verdict}")
     for reason in found.reasons:
         say(reason)

@@ -149,13 +149,7 @@ def check(tell: Tell, camera: str, images: list[str], board: str) -> dict[str, A
         raise InputError("describe the board under Calibrate first: this camera file does not tell which it was")
     target = pipeline.board_from(board) if board or calibration is None else calibration.observations.board
     seen = pipeline.detect(images, target, progress=progress)
-    found = checked(
-        known,
-        seen,
-        lambda views: pipeline.solve(views, known.model),
-        covariance=calibration.covariance if calibration else None,
-        solved_board=calibration.board if calibration else None,
-    )
+    found = checked(known, seen, lambda views: pipeline.solve(views, known.model), calibration)
     notes = [problem.message for problem in found.problems]
     return found.as_json() | {"name": known.name, "reasons": [*found.reasons, *notes]}
 
