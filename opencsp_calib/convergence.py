@@ -12,7 +12,7 @@ from opencsp_calib.schur import Factorisation, factorise
 
 __all__ = ["CONVERGED_SIGMAS", "LEAST_SIGMA_PX", "OPEN_CENTRE", "OPEN_FOCAL", "judged", "remaining_sigmas"]
 
-CONVERGED_SIGMAS = 0.1  # pixels rounded to single precision, which OpenCV takes, leave some 0.01
+CONVERGED_SIGMAS = 0.1  # pixels rounded to single precision, which some engines take, leave some 0.01
 SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this
 LEAST_SIGMA_PX = 0.01  # of a corner, per axis: exact corners of a bad set of views are no better set
 OPEN_FOCAL = 0.05  # sigma of a focal length over the focal length, above which it is as good as unknown
