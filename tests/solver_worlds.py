@@ -1,7 +1,5 @@
 """Worlds that the solvers' tests share, and other programs' solutions to hold against."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from opencsp_calib.board import Checkerboard
@@ -36,7 +34,3 @@ def sandia(data_dir):
         for number, pixels in enumerate(expected["p_image_points"], start=1)
     ]
     return Observations(Checkerboard(18, 23, 0.05), (1626, 1236), tuple(views)), expected
-
-
-def one_view(observations):
-    return replace(observations, views=observations.views[:1])

@@ -16,7 +16,6 @@ from opencsp_calib.rendering import Exposure, Scene
 
 BOARD = Checkerboard(9, 6, 0.05)
 SANDIA = Checkerboard(18, 23, 0.05)
-PLAIN = Scene(clutter=0.0)
 
 
 def find(image: Image, board: Checkerboard = BOARD) -> Detection:
