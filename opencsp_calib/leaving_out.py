@@ -6,9 +6,8 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
 from opencsp_calib.jacobian import CORNER, ViewRows
-from opencsp_calib.normal_equations import NormalEquations
+from opencsp_calib.normal_equations import ROUNDING, NormalEquations
 from opencsp_calib.schur import Factorisation
-from opencsp_calib.triangular import CholeskyRoot
 
 __all__ = ["camera_without_each_view"]
 
@@ -47,7 +46,7 @@ def camera_without_each_view(
 
 
 def _directly(equations: NormalEquations) -> Floats:
-    """(V, M): with a small dense matrix for each view."""
+    """(V, M): with a small dense matrix for each view; NaN where the other views leave something open."""
     solved = np.linalg.solve(
         equations.pose,
         np.concatenate([equations.shared_pose.transpose(0, 2, 1), equations.pose_gradient[..., None]], axis=2),
@@ -55,15 +54,13 @@ def _directly(equations: NormalEquations) -> Floats:
     information = equations.shared - equations.shared_pose @ solved[..., :-1]
     gradient = equations.shared_gradient - (equations.shared_pose @ solved[..., -1:])[..., 0]
     rest, rest_gradient = information.sum(axis=0) - information, gradient.sum(axis=0) - gradient
-    steps = np.full(gradient.shape, np.nan)
-    for view, (matrix, right) in enumerate(zip(rest, rest_gradient, strict=True)):
-        scale = 1.0 / np.sqrt(np.diag(matrix))
-        try:
-            root = CholeskyRoot.of(scale[:, None] * matrix * scale)
-        except np.linalg.LinAlgError:
-            continue  # stays NaN: the other views leave something open
-        steps[view] = -scale * root.solve(scale * right)
-    return steps
+    diagonal = np.diagonal(rest, axis1=1, axis2=2)
+    scale = 1.0 / np.sqrt(np.where(diagonal > 0, diagonal, np.inf))
+    sizes, directions = np.linalg.eigh(scale[:, :, None] * rest * scale[:, None])
+    along = directions.transpose(0, 2, 1) @ (scale * rest_gradient)[:, :, None]
+    known = sizes > ROUNDING
+    along = np.divide(along[:, :, 0], sizes, out=np.full(sizes.shape, np.nan), where=known)
+    return np.asarray(-scale * (directions @ along[:, :, None])[:, :, 0])
 
 
 def _by_iteration(whole: Factorisation, ahead: Floats | None, tolerance: float) -> Floats:
