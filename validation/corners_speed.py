@@ -1,13 +1,13 @@
-"""What the fit of the corners costs, and what its compiled code costs to load.
+"""What the fit of the corners costs, and what its compiled part costs to load.
 
 Claim
-    The fit of 400 corners takes at most 40 ms on one core (median), whatever the detector was off; importing it loads
-    no compiler; the compiled code is loaded from its file in the background, and compiled once on a machine.
+    The fit of 400 corners takes at most 40 ms on one core (median), whatever the detector was off; its compiled part is
+    loaded within 10 ms.
 
 Way
     A photograph of 1626x1236 with 378 corners at the largest window, starts 0.7 px off, one thread; times are scaled to
     400 corners, of the processor where not said otherwise. Two threads do the same work each at the same time. Starting
-    is measured in new processes with an empty folder for compiled code first. Only worth something on a quiet machine.
+    is measured in new processes, of which the first does not count. Only worth something on a quiet machine.
 
 Run ``python validation/bench.py corners_speed``.
 """

@@ -53,7 +53,7 @@ def main() -> None:
     """Run the command line; whatever goes wrong ends in one line and an exit code."""
     stop_when_told()
     code = run(sys.argv[1:])
-    gc.freeze()  # Python looks for cycles among all it ever made before it ends: with Numba loaded, 0.8 s for nothing
+    gc.freeze()  # or Python would look for cycles among all it ever made before it ends, for nothing
     sys.exit(code)
 
 
