@@ -1,6 +1,7 @@
 /* The steps of a fit, and corner after corner. */
 
 #include <math.h>
+#include <stddef.h>
 
 #include "corner_kernel.h"
 #include "exported.h"
@@ -74,7 +75,7 @@ static int fit(const Image *image, double *p, const double *bends, const double 
 
 /* Fit corner after corner, in place.
  *
- * image       height rows of width pixels
+ * image       height rows of width pixels, of as many bytes as said
  * white       grey level from which on a pixel is saturated
  * count       of corners
  * parameters  (count, PARAMETERS) in: where to begin; out: what was found
@@ -85,10 +86,10 @@ static int fit(const Image *image, double *p, const double *bends, const double 
  * examine     whether all that is found is wanted, not only the status
  * found       (count, DIAGNOSTICS) in: zeros
  */
-EXPORTED void fit_corners(const uint16_t *image, int64_t height, int64_t width, double white, int64_t count,
+EXPORTED void fit_corners(const void *image, int32_t bytes, int64_t height, int64_t width, double white, int64_t count,
                           double *parameters, const double *bends, const double *sizes, double tolerance,
                           int32_t most_steps, int32_t examine, double *found) {
-    const Image whole = {image, height, width};
+    const Image whole = {bytes == 1 ? image : NULL, bytes == 2 ? image : NULL, height, width};
     Window window;
     Factor factor;
     for (int64_t c = 0; c < count; c++) {

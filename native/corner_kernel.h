@@ -46,8 +46,10 @@ static inline double greater(double a, double b) { return a > b ? a : b; }
 static inline float lesser_f(float a, float b) { return a < b ? a : b; }
 static inline float greater_f(float a, float b) { return a > b ? a : b; }
 
+/* Grey levels of 8 or 16 bits, row after row; one of the two is NULL. */
 typedef struct {
-    const uint16_t *pixels;
+    const uint8_t *bytes;
+    const uint16_t *words;
     int64_t height, width;
 } Image;
 

@@ -36,13 +36,14 @@ int gather(const Image *image, const double *p, const double *size, Window *wind
         int count = last < first ? 0 : (int)(last - first + 1);
         if (n + count > MOST_PIXELS)
             return 0;
-        const uint16_t *pixels = image->pixels + row * image->width + first;
         float from = (float)(first - p[AT_X]);
         for (int k = 0; k < count; k++) {
             window->x[n + k] = from + (float)k;
             window->y[n + k] = (float)y;
-            window->level[n + k] = pixels[k];
         }
+        int64_t start = row * image->width + first;
+        for (int k = 0; k < count; k++)
+            window->level[n + k] = image->bytes ? image->bytes[start + k] : image->words[start + k];
         n += count;
     }
     window->count = n;

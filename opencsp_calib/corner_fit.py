@@ -11,7 +11,7 @@ from opencsp_calib.corner_kernel import DIAGNOSTICS, PARAMETERS
 
 __all__ = ["CornerFit", "Levels", "begin"]
 
-Levels: TypeAlias = NDArray[np.uint16]  # (height, width)
+Levels: TypeAlias = NDArray[np.uint8] | NDArray[np.uint16]  # (height, width)
 
 FIRST_BLUR_PX = 1.5
 ROUNDING = 1 / 12  # variance of grey levels: the least noise an image can have

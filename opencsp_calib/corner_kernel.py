@@ -19,7 +19,7 @@ RAMP_PX = 1.5  # over which a pixel's weight falls to nothing at the border of t
 
 
 def fit_corners(
-    image: NDArray[np.uint16],
+    image: NDArray[np.uint8] | NDArray[np.uint16],
     white: float,
     parameters: Floats,
     bends: Floats,
@@ -33,7 +33,7 @@ def fit_corners(
 
     Parameters
     ----------
-    image : (height, width) uint16
+    image : (height, width) uint8 or uint16
     white : float
         Grey level from which on a pixel is saturated.
     parameters : (n, 11)
@@ -59,17 +59,29 @@ def fit_corners(
     """
     found = np.zeros((len(parameters), DIAGNOSTICS))
     height, width = image.shape
-    _compiled()(
-        image, height, width, white, len(parameters), parameters, bends, windows, tolerance, most_steps, examine, found
+    _compiled(image.itemsize)(
+        image,
+        image.itemsize,
+        height,
+        width,
+        white,
+        len(parameters),
+        parameters,
+        bends,
+        windows,
+        tolerance,
+        most_steps,
+        examine,
+        found,
     )
     return found
 
 
 @cache
-def _compiled() -> Callable[..., None]:
+def _compiled(pixel_bytes: int) -> Callable[..., None]:
     return native_function(
         "fit_corners",
-        array_of(np.uint16, 2), c_int64, c_int64, c_double, c_int64,
+        array_of(np.uint8 if pixel_bytes == 1 else np.uint16, 2), c_int32, c_int64, c_int64, c_double, c_int64,
         result_of(np.float64, 2), array_of(np.float64, 2), array_of(np.float64, 2),
         c_double, c_int32, c_int32, result_of(np.float64, 2),
     )  # fmt: skip

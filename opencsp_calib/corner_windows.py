@@ -45,7 +45,7 @@ class Surroundings:
 
     Parameters
     ----------
-    image : (height, width) uint16
+    image : (height, width) uint8 or uint16
     white : int
         Grey level at which pixels are saturated.
     lengths : (n, 2) px

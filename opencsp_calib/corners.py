@@ -54,7 +54,7 @@ def refine(image: Image, detection: Detection, board: Board) -> Detection:
     if not (detection.ids.min() >= 0 and detection.ids.max() < columns * rows):
         raise InputError(f"the detection names a corner that the board, with {columns}x{rows}, does not have")
     vectors, lengths = edges(detection.pixels, detection.ids, columns)
-    levels = np.ascontiguousarray(image.pixels, dtype=np.uint16)
+    levels = image.pixels if image.pixels.flags.c_contiguous else image.pixels.copy()
     around = Surroundings(levels, image.white, lengths, np.zeros(lengths.shape), _clear(board))
     start = begin(levels, detection.pixels, vectors)
     near = _near(around, start)

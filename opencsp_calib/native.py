@@ -33,7 +33,7 @@ def native_function(name: str, *arguments: Any) -> Callable[..., None]:
     MissingDependencyError
         If the compiled part is not there.
     """
-    function = getattr(_library(), name)
+    function = _library()[name]  # not as an attribute, which would be one for all that it may take
     function.argtypes, function.restype = arguments, None
     made: Callable[..., None] = function
     return made

@@ -25,7 +25,7 @@ def test_an_installation_without_it_says_what_to_do(tmp_path: Path, monkeypatch:
 def test_an_array_of_another_kind_is_refused() -> None:
     image = np.zeros((20, 20), np.uint16)
     numbers = np.zeros((1, 11)), np.zeros((1, 2)), np.full((1, 4), 3.0)
-    for wrong in (image.astype(np.uint8), image[:, ::2], image.T[1:].T):
+    for wrong in (image.astype(np.float64), image[:, ::2], image.T[1:].T):
         with pytest.raises(ctypes.ArgumentError):
             fit_corners(wrong, 255, *numbers, 0.01, 5, examine=True)
 
@@ -40,6 +40,12 @@ def fitted(image: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     parameters = np.array([[20.0, 20.0, 0.02, np.pi / 2, 1.5, 100.0, 50.0, 0, 0, 0, 0]])
     window = np.array([[9.0, 9.0, np.inf, np.inf]])
     return parameters, fit_corners(image, 255, parameters, np.zeros((1, 2)), window, 1e-3, 20, examine=True)
+
+
+def test_eight_and_sixteen_bits_are_read_alike() -> None:
+    image = corner(20.3, 19.6)
+    for one, other in zip(fitted(image), fitted(image.astype(np.uint8)), strict=True):
+        assert np.array_equal(one, other)
 
 
 @pytest.mark.skipif(len(VARIANTS) < 2, reason="there is one form for all processors of this kind")

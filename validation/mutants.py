@@ -6,27 +6,36 @@ part alone notice more than 85 %.
 Way: mutmut's operators (another number, comparison, operator, word, argument) list every change in
 a function; a sample of 40 of each part (or as many as the argument says; seeded) is drawn, each is made alone in a copy
 of the project, and the tests of its part are run. A test that fails, and one that does not end in time, has noticed.
-mutmut's own runner is not used: it knows no parts. What is written in C is not changed. Survivors are shown, those that
-make no difference included.
+mutmut's own runner is not used: it knows no parts. In C, which mutmut does not know, operators are exchanged and
+numbers made larger by one. Survivors are shown, those that make no difference included.
 """
 
 import difflib
 import os
+import re
+import runpy
 import shutil
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from libcst import Module
-from mutmut.mutation.file_mutation import Mutation, create_mutations, deep_replace
+from mutmut.mutation.file_mutation import create_mutations, deep_replace
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).resolve().parents[1]
+EXCHANGED = {
+    "+": "-", "-": "+", "*": "/", "/": "*", "+=": "-=", "-=": "+=", "<": "<=", ">": ">=", "<=": "<", ">=": ">",
+    "&&": "||", "||": "&&", "==": "!=",
+}  # fmt: skip
+IN_C = re.compile(
+    rf"(?<= )(?:{'|'.join(sorted(map(re.escape, EXCHANGED), key=len, reverse=True))})(?= )|(?<![\w.])\d+(?![\w]*\[)"
+)
 COPIED = ("opencsp_calib", "plugins", "tests", "docs", "native", "validation", "pyproject.toml", "README.md")
 SEED = 20261128
 
@@ -48,6 +57,11 @@ PARTS = (
         ("corners.py", *(f"corner_{what}.py" for what in ("fit", "grid", "judgement", "windows", "kernel"))),
         ("test_corner_grid", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
     ),
+    Part(
+        "corners in C",
+        ("../native/corner_*.c",),
+        ("test_native", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
+    ),
     Part("hdf5", ("hdf5*.py",), ("test_hdf5", "test_hdf5_damage")),
     Part("comparison", ("comparison.py",), ("test_comparison",)),
 )
@@ -59,13 +73,12 @@ class Mutant:
 
     file: str
     before: str
-    module: Module
-    mutation: Mutation
+    made: Callable[[], str]
 
     @cached_property
     def after(self) -> str:
         """What the file says with it."""
-        return deep_replace(self.module, self.mutation.original_node, self.mutation.mutated_node).code
+        return self.made()
 
     @property
     def change(self) -> str:
@@ -80,11 +93,36 @@ def mutants_of(part: Part) -> list[Mutant]:
     found = []
     for pattern in part.files:
         for path in sorted((ROOT / "opencsp_calib").glob(pattern)):
-            file, code = str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
-            module, mutations, *_ = create_mutations(file, code)
-            inside = [mutation for mutation in mutations if mutation.contained_by_top_level_function]
-            found += [Mutant(file, code, module, mutation) for mutation in inside]
+            file, code = str(path.resolve().relative_to(ROOT)), path.read_text(encoding="utf-8")
+            changes = changes_in_c(code) if path.suffix == ".c" else changes_in_python(file, code)
+            found += [Mutant(file, code, change) for change in changes]
     return found
+
+
+def changes_in_python(file: str, code: str) -> Iterator[Callable[[], str]]:
+    """Mutmut's."""
+    module, mutations, *_ = create_mutations(file, code)
+    for mutation in mutations:
+        if mutation.contained_by_top_level_function:
+            yield lambda m=mutation: deep_replace(module, m.original_node, m.mutated_node).code
+
+
+def changes_in_c(code: str) -> Iterator[Callable[[], str]]:
+    """Another operator, or a number larger by one."""
+    blanked = re.sub(r"/\*.*?\*/|^#.*?$", lambda found: " " * len(found[0]), code, flags=re.DOTALL | re.MULTILINE)
+    for found in IN_C.finditer(blanked):
+        changed = code[: found.start()] + (EXCHANGED.get(found[0]) or str(int(found[0]) + 1)) + code[found.end() :]
+        yield lambda changed=changed: changed
+
+
+def compiled(copy: Path) -> bool:
+    """Whether the part in C can be, which is then done."""
+    hook = runpy.run_path(str(copy / "native" / "build_hook.py"))["NativeLibraries"]
+    try:
+        hook(str(copy), {}, None, None, "", "wheel").initialize("", {"artifacts": []})
+    except SystemExit:
+        return False
+    return True
 
 
 def outcome(copy: Path, part: Part, timeout_s: float) -> str:
@@ -111,7 +149,7 @@ def tried(copy: Path, part: Part, chosen: list[Mutant]) -> list[str]:
     for number, mutant in enumerate(chosen, start=1):
         path = copy / mutant.file
         path.write_text(mutant.after, encoding="utf-8")
-        found.append(outcome(copy, part, timeout_s))
+        found.append(outcome(copy, part, timeout_s) if compiled(copy) else "fail")
         path.write_text(mutant.before, encoding="utf-8")
         print(f"{part.name}: {number} of {len(chosen)}, {found.count('pass')} survive", file=sys.stderr, flush=True)
     return found
