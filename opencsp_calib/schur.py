@@ -13,6 +13,7 @@ With more views than corners nothing is kept whose size grows with both: what ti
 again, view after view, where it is needed.
 """
 
+import mmap
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -175,7 +176,7 @@ class CornersKept(Factorisation):
         inverse_roots = np.linalg.inv(np.linalg.cholesky(_damped(equations.pose, damping)))
         corners = CORNER * len(equations.corner)
         every, blocks = np.arange(len(equations.corner)), _damped(equations.corner, damping)
-        reduced = np.zeros((corners + equations.unknowns.shared,) * 2)
+        reduced = _zeros_apart(corners + equations.unknowns.shared)
         for row, column in np.ndindex(CORNER, CORNER):
             reduced[row * len(every) + every, column * len(every) + every] = blocks[:, row, column]
         reduced[corners:, :corners] = equations.corner_shared.swapaxes(0, 1).reshape(equations.unknowns.shared, corners)
@@ -220,6 +221,12 @@ def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[tu
         for rows in equations.rows(begin, run.stop):
             blocks[rows.view - begin][:, :, rows.columns] = rows.pose_corner()
         yield run, (inverse_roots[run] @ ties).reshape(-1, ties.shape[2])
+
+
+def _zeros_apart(size: int) -> Matrix:
+    """(size, size) in memory of their own, which goes back to the system with them: a heap would keep it."""
+    memory = mmap.mmap(-1, size * size * np.dtype(np.float64).itemsize)
+    return np.frombuffer(memory, dtype=np.float64).reshape(size, size)
 
 
 def _damped(blocks: Floats, damping: float) -> Floats:
