@@ -4,6 +4,7 @@ The compiler is the one that the environment variable CC names, else the machine
 There are two libraries: one for every processor of the kind, and on x86-64 a quicker one for those with AVX2.
 """
 
+import hashlib
 import os
 import platform
 import shlex
@@ -74,9 +75,11 @@ def _zig() -> list[str]:
 def _compile(command: list[str], library: Path) -> None:
     position = () if sys.platform == "win32" else ("-fPIC",)
     sources = [str(source) for source in sorted(SOURCES.glob("*.c"))]
+    code = b"".join(file.read_bytes() for file in sorted(SOURCES.glob("*.[ch]")))
+    made_of = f'-DMADE_OF="{hashlib.sha256(code).hexdigest()}"'
     new = library.with_name(f"new-{library.name}")  # a library in use must not be written over
     try:
-        subprocess.run([*command, *position, "-o", str(new), *sources, "-lm"], check=True)
+        subprocess.run([*command, *position, made_of, "-o", str(new), *sources, "-lm"], check=True)
     except (OSError, subprocess.CalledProcessError) as error:
         raise SystemExit(f"the C part of opencsp-calib could not be compiled: {error}") from None
     new.replace(library)

@@ -4,6 +4,7 @@ Its sources are in the folder `native` beside the package. Calls let other threa
 """
 
 import ctypes
+import hashlib
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -16,7 +17,9 @@ from opencsp_calib.errors import MissingDependencyError
 
 __all__ = ["array_of", "native_function", "result_of"]
 
+SOURCES = Path(__file__).parents[1] / "native"  # in a checkout; elsewhere the library cannot be of another version
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+AGAIN = "install opencsp-calib again (with pip, or make in a checkout)"
 
 
 def native_function(name: str, *arguments: Any) -> Callable[..., None]:
@@ -58,8 +61,13 @@ def _library() -> ctypes.CDLL:
 def _load(variant: str) -> ctypes.CDLL:
     file = Path(__file__).with_name(f"_native{variant}{SUFFIX}")
     try:
-        return ctypes.CDLL(str(file))
+        library = ctypes.CDLL(str(file))
     except OSError as error:
         raise MissingDependencyError(
-            f"the compiled part of opencsp-calib cannot be loaded ({error}): install opencsp-calib again with pip"
+            f"the compiled part of opencsp-calib cannot be loaded ({error}): {AGAIN}"
         ) from None
+    library.made_of.restype = ctypes.c_char_p
+    code = b"".join(file.read_bytes() for file in sorted(SOURCES.glob("*.[ch]")))
+    if (SOURCES / "build_hook.py").exists() and library.made_of() != hashlib.sha256(code).hexdigest().encode():
+        raise MissingDependencyError(f"the compiled part of opencsp-calib is older than its sources: {AGAIN}")
+    return library

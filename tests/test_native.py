@@ -22,6 +22,14 @@ def test_an_installation_without_it_says_what_to_do(tmp_path: Path, monkeypatch:
         native._library.__wrapped__()
 
 
+def test_one_that_is_older_than_its_sources_is_not_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "build_hook.py").touch()
+    (tmp_path / "changed.c").write_text("int changed;\n", encoding="utf-8")
+    monkeypatch.setattr(native, "SOURCES", tmp_path)
+    with pytest.raises(MissingDependencyError, match="older than its sources: install opencsp-calib again"):
+        native._library.__wrapped__()
+
+
 def test_an_array_of_another_kind_is_refused() -> None:
     image = np.zeros((20, 20), np.uint16)
     numbers = np.zeros((1, 11)), np.zeros((1, 2)), np.full((1, 4), 3.0)

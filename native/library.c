@@ -1,8 +1,11 @@
-/* What the processor can do. */
+/* What the library was made of, and what the processor can do. */
 
 #include <stdint.h>
 
 #include "exported.h"
+
+/* The SHA-256 of the sources, hexadecimal: Python refuses a library that is older than they are. */
+EXPORTED const char *made_of(void) { return MADE_OF; }
 
 #if defined(__x86_64__)
 #include <cpuid.h>
