@@ -2,6 +2,7 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
 import time
@@ -28,9 +29,8 @@ class Server:
 
     def __enter__(self) -> "Server":
         command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser", *self._options]
-        self.process = subprocess.Popen(
-            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=self._environment
-        )
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        self.process = subprocess.Popen(command, **pipes, text=True, env=self._environment, start_new_session=True)
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"(http://[\w.-]+:[0-9]+/)\?token=([\w-]{20,})", self.address)
         assert match, self.process.communicate()
@@ -38,7 +38,10 @@ class Server:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.process.terminate()
+        if os.name == "posix":  # as Ctrl-C in a terminal, which its own processes get too
+            os.killpg(self.process.pid, signal.SIGINT)
+        else:
+            self.process.terminate()
         self.more_output, self.errors = self.process.communicate(timeout=120)
 
 

@@ -24,7 +24,12 @@ COLUMNS: list[dict[str, Any]] = [
     {"name": "rms", "label": "rms (px)", "field": "rms", "sortable": True},
     {"name": "problems", "label": "To know", "field": "problems", "align": "left", "classes": "wide"},
 ]
-ROW_PX = 53
+IN_SIGHT = (
+    "virtual-scroll virtual-scroll-item-size=53 "  # the height of a row in px
+    "virtual-scroll-slice-ratio-before=0.5 virtual-scroll-slice-ratio-after=0.5"
+)
+"""Draws the rows that can be seen, and half as many before and after them: each costs time whenever one changes."""
+
 START = (
     "Describe the board on the left and select about 50 photographs of it: tilted by 30 to 45 degrees to every side, "
     "half of them with the board turned by 90 degrees, together filling the whole image. Each photograph is listed "
@@ -35,8 +40,7 @@ START = (
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    table = PhotographTable(page, COLUMNS).props("virtual-scroll data-testid=images").classes("views")
-    table.props(f"virtual-scroll-item-size={ROW_PX}")  # else many more rows are drawn than can be seen
+    table = PhotographTable(page, COLUMNS).props(f"{IN_SIGHT} data-testid=images").classes("views")
     empty = ui.label(START).classes("quiet empty")
 
     def refresh() -> None:
