@@ -53,7 +53,8 @@ class Window:
 
     def open(self) -> None:
         self.browser.get(self.server.address)
-        self.until(lambda: self.status)
+        # what is typed before the page has its connection comes late, and out of order
+        self.until(lambda: self.status and self.browser.execute_script("return window.did_handshake"))
 
     def leave(self) -> None:
         """Close the page: an open one would go on looking for its server, at the cost of what follows."""
@@ -67,11 +68,10 @@ class Window:
             self.press("Clear")
         self.until(lambda: self.text_is_there("0 photographs"))
 
-    def has_result(self, name: str, views: int) -> bool:
-        """Whether a camera of that name is calibrated from that many photographs, with none left out."""
-        named = self.element("camera-name").get_attribute("value") == name
+    def has_result(self, views: int) -> bool:
+        """Whether a camera is calibrated from that many photographs, with none left out."""
         complete = self.text_is_there(f"\n{views} photographs") and not self.text_is_there("Left out:")
-        return named and complete and any(map(str.isdigit, self.rms))
+        return complete and any(map(str.isdigit, self.rms))
 
     def element(self, testid: str) -> Any:
         return self.browser.find_element("css selector", f"[data-testid={testid}]")

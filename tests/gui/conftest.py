@@ -85,8 +85,8 @@ def small(window: Window, photographs: Path) -> Window:
 
 @pytest.fixture
 def calibrated(page: Window, photographs: Path) -> Window:
-    """With a calibration from them; where the test before left one, with that."""
-    if not page.has_result("small", 12):
+    """With a calibration from them; where the test before left one, with that: tests of it stand together."""
+    if not page.has_result(12):
         page.clear()
         _select(page, photographs)
         page.find_corners()

@@ -44,6 +44,65 @@ def test_put_back_is_as_before(calibrated: Window) -> None:
     assert calibrated.rms == rms
 
 
+def test_cross_validation_and_the_report(calibrated: Window) -> None:
+    calibrated.tab("Cross-validation")
+    calibrated.press("Cross-validate")
+    calibrated.until(lambda: calibrated.status.startswith("The solvers"))
+    calibrated.until(lambda: calibrated.text_is_there("Solver against solver"))
+    calibrated.picture("cross-validation")
+    calibrated.choose("What", "Report (HTML)")
+    calibrated.type("save-as", "report")
+    calibrated.click("save-camera")
+    calibrated.until(lambda: calibrated.status == "Report saved: report.html")
+    assert "Provenance" in (calibrated.server.folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_the_keyboard_alone_will_do(calibrated: Window) -> None:
+    """Tab comes to every field and button in the order of use; what has the keyboard is seen; space presses."""
+    from selenium.webdriver import ActionChains, Keys
+
+    calibrated.open()  # with nothing clicked on yet
+    order = []
+    while order[-1:] != ["save-camera"] and len(order) < 60:
+        ActionChains(calibrated.browser).send_keys(Keys.TAB).perform()
+        order.append(calibrated.focused())
+    wanted = "camera-name grid-x grid-y square-size select-images find-corners view-corners calibrate"
+    wanted += " reprojection-error visualize-distortion save-camera"
+    assert [name for name in order if name in wanted.split()] == wanted.split()
+    around = "return getComputedStyle(document.activeElement).boxShadow"
+    assert calibrated.browser.execute_script(around) != "none"
+    calibrated.browser.execute_script("document.querySelector('[data-testid=visualize-distortion]').focus()")
+    ActionChains(calibrated.browser).send_keys(" ").perform()
+    calibrated.until(lambda: calibrated.find_all("img[alt='size of the distortion']"))
+
+
+def test_a_camera_file_is_solved_again_and_views_are_left_out(calibrated: Window) -> None:
+    rms, folder = calibrated.rms, calibrated.server.folder
+    calibrated.type("save-as", "to-solve-again.h5")
+    calibrated.click("save-camera")
+    calibrated.until(lambda: calibrated.status == "Camera saved: to-solve-again.h5")
+    calibrated.tab("Existing camera")
+    calibrated.type("camera-file", "to-solve-again.h5")
+    calibrated.click("open-camera")
+    calibrated.until(lambda: calibrated.enabled("solve-again"))
+    calibrated.click("solve-again")
+    calibrated.until(lambda: calibrated.status.startswith("Corners of 12 views"))
+    assert not calibrated.enabled("find-corners")
+    calibrated.calibrate()
+    assert calibrated.rms == rms
+    calibrated.browser.find_element("css selector", ".more .q-item").click()
+    calibrated.until(lambda: calibrated.element("drop-worst").is_displayed())
+    calibrated.type("drop-worst", "2")
+    calibrated.click("calibrate")
+    calibrated.until(lambda: "from 10 views" in calibrated.status)
+    calibrated.type("drop-worst", "")
+    calibrated.click("save-camera")
+    calibrated.press("Overwrite")
+    calibrated.until(lambda: calibrated.status == "Camera saved: to-solve-again.h5")
+    run_cli("solve", folder / "to-solve-again.h5", "-o", folder / "by-cli.h5")
+    assert Camera.load(folder / "by-cli.h5") == Camera.load(folder / "to-solve-again.h5")
+
+
 def test_an_existing_camera(small: Window, small_world: SmallWorld, tmp_path: Path) -> None:
     small_world.camera.save(small.server.folder / "truth.h5")
     small.tab("Existing camera")
@@ -76,46 +135,6 @@ def test_an_existing_camera(small: Window, small_world: SmallWorld, tmp_path: Pa
     assert len(list((small.server.folder / "undistorted").glob("*.png"))) == 12
 
 
-def test_cross_validation_and_the_report(calibrated: Window) -> None:
-    calibrated.tab("Cross-validation")
-    calibrated.press("Cross-validate")
-    calibrated.until(lambda: calibrated.status.startswith("The solvers"))
-    calibrated.until(lambda: calibrated.text_is_there("Solver against solver"))
-    calibrated.picture("cross-validation")
-    calibrated.choose("What", "Report (HTML)")
-    calibrated.type("save-as", "report")
-    calibrated.click("save-camera")
-    calibrated.until(lambda: calibrated.status == "Report saved: report.html")
-    assert "Provenance" in (calibrated.server.folder / "report.html").read_text(encoding="utf-8")
-
-
-def test_a_camera_file_is_solved_again_and_views_are_left_out(calibrated: Window) -> None:
-    rms, folder = calibrated.rms, calibrated.server.folder
-    calibrated.type("save-as", "to-solve-again.h5")
-    calibrated.click("save-camera")
-    calibrated.until(lambda: calibrated.status == "Camera saved: to-solve-again.h5")
-    calibrated.tab("Existing camera")
-    calibrated.type("camera-file", "to-solve-again.h5")
-    calibrated.click("open-camera")
-    calibrated.until(lambda: calibrated.enabled("solve-again"))
-    calibrated.click("solve-again")
-    calibrated.until(lambda: calibrated.status.startswith("Corners of 12 views"))
-    assert not calibrated.enabled("find-corners")
-    calibrated.calibrate()
-    assert calibrated.rms == rms
-    calibrated.browser.find_element("css selector", ".more .q-item").click()
-    calibrated.until(lambda: calibrated.element("drop-worst").is_displayed())
-    calibrated.type("drop-worst", "2")
-    calibrated.click("calibrate")
-    calibrated.until(lambda: "from 10 views" in calibrated.status)
-    calibrated.type("drop-worst", "")
-    calibrated.click("save-camera")
-    calibrated.press("Overwrite")
-    calibrated.until(lambda: calibrated.status == "Camera saved: to-solve-again.h5")
-    run_cli("solve", folder / "to-solve-again.h5", "-o", folder / "by-cli.h5")
-    assert Camera.load(folder / "by-cli.h5") == Camera.load(folder / "to-solve-again.h5")
-
-
 def test_many_cameras(window: Window, photographs: Path) -> None:
     fleet = window.server.folder / "fleet"
     for name in ("north", "south"):
@@ -137,25 +156,6 @@ def test_many_cameras(window: Window, photographs: Path) -> None:
     window.tab("About")
     window.until(lambda: window.text_is_there("Agisoft Metashape"))
     window.picture("about")
-
-
-def test_the_keyboard_alone_will_do(calibrated: Window) -> None:
-    """Tab comes to every field and button in the order of use; what has the keyboard is seen; space presses."""
-    from selenium.webdriver import ActionChains, Keys
-
-    calibrated.open()  # with nothing clicked on yet
-    order = []
-    while order[-1:] != ["save-camera"] and len(order) < 60:
-        ActionChains(calibrated.browser).send_keys(Keys.TAB).perform()
-        order.append(calibrated.focused())
-    wanted = "camera-name grid-x grid-y square-size select-images find-corners view-corners calibrate"
-    wanted += " reprojection-error visualize-distortion save-camera"
-    assert [name for name in order if name in wanted.split()] == wanted.split()
-    around = "return getComputedStyle(document.activeElement).boxShadow"
-    assert calibrated.browser.execute_script(around) != "none"
-    calibrated.browser.execute_script("document.querySelector('[data-testid=visualize-distortion]').focus()")
-    ActionChains(calibrated.browser).send_keys(" ").perform()
-    calibrated.until(lambda: calibrated.find_all("img[alt='size of the distortion']"))
 
 
 def test_print_a_board(window: Window, tmp_path: Path) -> None:

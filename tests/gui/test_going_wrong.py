@@ -86,10 +86,38 @@ def test_reload_in_the_middle_and_a_second_tab_lose_nothing(small: Window) -> No
     small.until(lambda: small.enabled("calibrate"))
     rms = small.calibrate()
     small.type("camera-name", "renamed")
-    browser.close()
+    second = browser.current_window_handle
     browser.switch_to.window(first)
     small.until(lambda: small.rms == f"{rms:.4f} px")
     small.until(lambda: small.element("camera-name").get_attribute("value") == "renamed")
+    browser.switch_to.window(second)
+    browser.close()
+    browser.switch_to.window(first)
+
+
+def test_a_place_that_cannot_be_written(calibrated: Window) -> None:
+    folder = calibrated.server.folder
+    (folder / "taken.h5").mkdir()
+    for place, words in (
+        ("no/such/camera.h5", "does not exist"),
+        ("taken.h5", "is a folder"),
+        ("../out.h5", "outside of"),
+    ):
+        calibrated.type("save-as", place)
+        calibrated.click("save-camera")
+        calibrated.until(lambda words=words: words in calibrated.status)
+    assert not list(folder.glob("*.h5/*"))
+    calibrated.type("save-as", "camera.h5")
+    calibrated.click("save-camera")
+    calibrated.until(lambda: calibrated.status == "Camera saved: camera.h5")
+    written = (folder / "camera.h5").read_bytes()
+    calibrated.click("save-camera")
+    calibrated.until(lambda: calibrated.text_is_there("is there already"))
+    calibrated.picture("overwrite")
+    calibrated.press("Keep it")
+    calibrated.until(lambda: calibrated.enabled("save-camera"))
+    assert (folder / "camera.h5").read_bytes() == written
+    assert stat.S_ISREG((folder / "camera.h5").stat().st_mode)
 
 
 def test_tomorrow_it_goes_on_from_here(
@@ -119,28 +147,3 @@ def test_tomorrow_it_goes_on_from_here(
         window.until(lambda: "pip install 'opencsp-calib[basler]'" in window.element("capture-lacking").text)
         assert not window.enabled("capture-start")
         window.leave()
-
-
-def test_a_place_that_cannot_be_written(calibrated: Window) -> None:
-    folder = calibrated.server.folder
-    (folder / "taken.h5").mkdir()
-    for place, words in (
-        ("no/such/camera.h5", "does not exist"),
-        ("taken.h5", "is a folder"),
-        ("../out.h5", "outside of"),
-    ):
-        calibrated.type("save-as", place)
-        calibrated.click("save-camera")
-        calibrated.until(lambda words=words: words in calibrated.status)
-    assert not list(folder.glob("*.h5/*"))
-    calibrated.type("save-as", "camera.h5")
-    calibrated.click("save-camera")
-    calibrated.until(lambda: calibrated.status == "Camera saved: camera.h5")
-    written = (folder / "camera.h5").read_bytes()
-    calibrated.click("save-camera")
-    calibrated.until(lambda: calibrated.text_is_there("is there already"))
-    calibrated.picture("overwrite")
-    calibrated.press("Keep it")
-    calibrated.until(lambda: calibrated.enabled("save-camera"))
-    assert (folder / "camera.h5").read_bytes() == written
-    assert stat.S_ISREG((folder / "camera.h5").stat().st_mode)
