@@ -57,7 +57,10 @@ class SettingFields:
         typed = {setting: made for setting, made in self._made if isinstance(made, ui.input)}
         fields = ", ".join(f"{setting}: getElement({made.id})?.inputValue" for setting, made in typed.items())
         pause = "await new Promise((done) => setTimeout(done, 200));"
-        values = await ui.context.client.run_javascript(f"{pause} return {{{fields}}};", timeout=60)
+        try:
+            values = await ui.context.client.run_javascript(f"{pause} return {{{fields}}};", timeout=60)
+        except TimeoutError:  # the page was closed or loaded again before it could answer
+            return
         for setting, made in typed.items():
             if isinstance(values.get(setting), str) and values[setting] != made.value:
                 made.set_value(values[setting])
