@@ -104,6 +104,8 @@ def by_window(window: Window, images: list[Path], *, asking: bool) -> tuple[floa
     while asking and not window.status.startswith("The board is found"):
         answers.append(window.browser.execute_async_script(CLICK, *CLICKS[len(answers) % len(CLICKS)]))
         time.sleep(0.2)
+    if asking:
+        window.browser.execute_async_script(CLICK, *CLICKS[-2])  # back to where the search was begun
     window.until(lambda: window.status.startswith("The board is found"), 1200)
     window.calibrate()
     window.click("save-camera")

@@ -205,12 +205,13 @@ def _finish(
     """Save, report, and tell."""
     from opencsp_calib.hdf5_calibration import save_calibration
     from opencsp_calib.judgement import judge
-    from opencsp_calib.report import write_report
     from opencsp_calib.summary import calibration_as_json
 
     if output:
         save_calibration(result, output)
     if report:
+        from opencsp_calib.report import write_report
+
         write_report(result, report, before=before)
     _say_result(result, before)
     say_problems(judge(result))

@@ -4,7 +4,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
 
-__all__ = ["known", "mean_known", "padded", "predicted", "square_height", "steps", "trimmed"]
+__all__ = ["height_between", "known", "mean_known", "padded", "predicted", "square_height", "steps", "trimmed"]
 
 
 def known(grid: Floats) -> Mask:
@@ -77,7 +77,11 @@ def steps(grid: Floats) -> tuple[Floats, Floats]:
 
 def square_height(grid: Floats) -> Floats:
     """(m, n) px, how far an edge is from the next parallel one: the smaller height of the squares' parallelogram."""
-    down, on = steps(grid)
+    return height_between(*steps(grid))
+
+
+def height_between(down: Floats, on: Floats) -> Floats:
+    """(...) px, the smaller height of the parallelogram of two steps (..., 2)."""
     area = np.abs(down[..., 0] * on[..., 1] - down[..., 1] * on[..., 0])
     longest = np.maximum(np.linalg.norm(down, axis=-1), np.linalg.norm(on, axis=-1))
     return np.asarray(area / np.maximum(longest, 1e-12))

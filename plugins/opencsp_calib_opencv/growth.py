@@ -4,7 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Floats, Mask, Pixels
-from opencsp_calib_opencv.grid import known, mean_known, padded, predicted, square_height, steps, trimmed
+from opencsp_calib_opencv.grid import (
+    height_between,
+    known,
+    mean_known,
+    padded,
+    predicted,
+    square_height,
+    steps,
+    trimmed,
+)
 from opencsp_calib_opencv.neighbours import Neighbours
 from opencsp_calib_opencv.rings import look
 
@@ -88,14 +97,15 @@ def belongs(grey: NDArray[np.float32], grid: Floats, ring: float = RING) -> Mask
     there = known(grid)
     if not there.any():
         return there
-    height = square_height(grid)[there]
+    down, on = (step[there] for step in steps(grid))
+    height = height_between(down, on)
     rings = look(grey, grid[there], np.clip(np.nan_to_num(ring * height), SMALLEST_RING_PX, LARGEST_RING_PX))
     row, column = np.nonzero(there)
     swapped = (row + column) % 2 == 1  # the first edge of one corner is the second of the next
     edges = np.where(swapped[:, None], rings.edges[:, ::-1], rings.edges)
-    down, on = (np.arctan2(step[there][:, 1], step[there][:, 0]) for step in steps(grid))
-    straight = _turn(edges, np.column_stack([down, on])) < MOST_TURN_RAD
-    crossed = _turn(edges, np.column_stack([on, down])) < MOST_TURN_RAD
+    angles = np.column_stack([np.arctan2(step[:, 1], step[:, 0]) for step in (down, on)])
+    straight = _turn(edges, angles) < MOST_TURN_RAD
+    crossed = _turn(edges, angles[:, ::-1]) < MOST_TURN_RAD
     usual = USUAL_UNLIKENESS[0] + USUAL_UNLIKENESS[1] * float(np.median(rings.unlikeness))
     good = rings.crossing & (rings.unlikeness < min(MOST_UNLIKENESS, usual))
     good &= rings.contrast > CONTRAST_FRACTION * np.median(rings.contrast)

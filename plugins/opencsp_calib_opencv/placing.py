@@ -74,7 +74,7 @@ def placed(grey: NDArray[np.float32], grid: Floats, board: Board) -> Placed | No
         return None
     grid = grid if _handedness(grid) > 0 else grid[::-1]
     whole = sorted(grid.shape[:2]) == sorted((rows, columns))
-    readings = list(_readings(grey, grid, board))
+    readings = list(_readings(grey, grid, board, whole))
     dark_first = [reading for reading in readings if reading.dark_first]
     readings = dark_first or (readings if whole else [])
     alike = _symmetries(board)
@@ -87,11 +87,11 @@ def placed(grey: NDArray[np.float32], grid: Floats, board: Board) -> Placed | No
     return Placed(ids[there][order], grid[there][order], _square_px(grid))
 
 
-def _readings(grey: NDArray[np.float32], grid: Floats, board: Board) -> Iterator[_Reading]:
-    """All readings that nothing in the picture speaks against."""
+def _readings(grey: NDArray[np.float32], grid: Floats, board: Board, whole: bool) -> Iterator[_Reading]:
+    """All readings that nothing in the picture speaks against; where the whole board is, its size tells its place."""
     columns, rows = board.grid
     all_ids = np.arange(columns * rows).reshape(rows, columns)
-    sides = sides_seen(grey, grid)
+    sides = (False,) * 4 if whole else sides_seen(grey, grid)
     down, on = _mean_steps(grid)
     for turns, begins_dark in enumerate(_begin_dark(grey, grid)):
         height, width = grid.shape[:2] if turns % 2 == 0 else grid.shape[1::-1]
