@@ -24,7 +24,7 @@ static void pull(const double *p, const Window *window, double pulls[PARAMETERS]
     }
 }
 
-/* The inverse normal matrix of x and y, and their response to bends. */
+/* The inverse normal matrix of x and y, and their response to bends: what a bend adds to the image, they take back. */
 void examine_place(const double *p, const Window *window, Factor factor, double *found) {
     double pulls[PARAMETERS][2];
     pull(p, window, pulls);
@@ -35,7 +35,7 @@ void examine_place(const double *p, const Window *window, Factor factor, double 
         found[INVERSE + coordinate] = row[AT_X], found[INVERSE + coordinate + 1] = row[AT_Y];
         for (int edge = 0; edge < 2; edge++)
             for (int k = 0; k < PARAMETERS; k++)
-                found[RESPONSE + 2 * coordinate + edge] += row[k] * pulls[k][edge];
+                found[RESPONSE + 2 * coordinate + edge] -= row[k] * pulls[k][edge];
     }
 }
 

@@ -27,6 +27,7 @@ from calib_targets import detect_chessboard
 from opencsp_calib_opencv.board_kinds import CharucoKind
 from opencsp_calib_opencv.charuco import CharucoDetector
 from opencsp_calib_opencv.checkerboard import CheckerboardDetector
+from threadpoolctl import threadpool_limits
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from board_photographs import Photograph, small_camera
@@ -219,6 +220,7 @@ def nothing_there() -> None:
 def main() -> None:
     """Print the tables."""
     cv2.setNumThreads(1)
+    threadpool_limits(1, user_api="blas")  # whose threads count while they wait
     for search in SEARCHES.values():  # nothing is timed that is done once
         search(next(photographs({}, 1)).image, BOARD)
     print(f"OpenCV {cv2.__version__}, calib-targets {version('calib-targets')}.")
