@@ -11,7 +11,7 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_kernel import PARAMETERS, RAMP_PX, fit_corners
 from opencsp_calib.native import array_of, native_function, result_of
 
-MODEL = np.array([0.2, -0.1, 0.15, 1.3, 1.3, 100.0, 60.0, 0.03, -0.02, 0.01, 0.02])
+MODEL = np.array([0.2, -0.1, 0.15, 1.3, 1.3, 100.0, 60.0, 0.03, -0.02, 1.0, -0.8])  # light far steeper than any
 BENDS = np.array([0.002, -0.001])
 FAR = np.array([100.0, 100.0, np.inf, np.inf])
 WHITE = 200.0
