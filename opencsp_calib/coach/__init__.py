@@ -4,6 +4,7 @@
 
     preview.py     one frame of the live picture: the board, found on a reduced image, and what is wrong with it
     knowledge.py   what the photographs taken so far tell: a camera, its uncertainty, what they lack
+    lacking.py     what a set of views still needs by the seed's procedure
     next_view.py   where to hold the board next: the view that takes most of the uncertainty away
     wording.py     that, in words and drawn with characters
     moment.py      gauges of one frame, and whether this is the moment for a photograph
