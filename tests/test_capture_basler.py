@@ -67,7 +67,7 @@ def test_sandias_photographs_through_the_camera_to_a_camera_file(data_dir: Path,
 def test_no_camera_is_one_sentence(tmp_path: Path) -> None:
     done = captured(tmp_path / "set", cameras=0)
     assert done.returncode == 2
-    assert done.stderr.startswith("error: there is no Basler camera ''; no Basler camera is connected: check cable")
+    assert done.stderr.startswith("error: no Basler camera is connected: check cable")
     assert len(done.stderr.splitlines()) == 1
 
 

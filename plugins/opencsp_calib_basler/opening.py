@@ -54,8 +54,9 @@ def connected(serial: str) -> Any:
     there = serial_numbers()
     if serial not in there:
         others = f"connected are {', '.join(there)}" if there else "no Basler camera is connected"
+        wanted = f"there is no Basler camera {serial!r}; " if serial else ""
         raise InputError(
-            f"there is no Basler camera {serial!r}; {others}: check cable and power, and on GigE that camera and "
+            f"{wanted}{others}: check cable and power, and on GigE that camera and "
             "adapter are in the same subnet (Basler's pylon IP Configurator)"
         )
     info = pylon.DeviceInfo()
