@@ -11,12 +11,8 @@ from opencsp_calib_opencv.markers import Cells, Markers, quad_areas, read_marker
 
 __all__ = ["Layout", "laid_out", "read_board"]
 
-MOST_APART = (
-    0.25  # of a square: how far two markers may disagree on the corner between them; another layout is off by 1
-)
+MOST_APART = 0.25  # of a square: how far two markers may disagree on a corner; another layout is off by 1
 LEAST_AGREEMENT = 0.8  # of the corners that two markers foretell
-
-
 AROUND = np.array([[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5]])  # a square's corners, from its middle
 
 
