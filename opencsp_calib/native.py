@@ -29,7 +29,7 @@ def native_function(name: str, *arguments: Any) -> Callable[..., None]:
     ----------
     name : str
     *arguments : ctypes type, `array_of` or `result_of`
-        What it takes; a call with anything else is a TypeError.
+        What it takes; a call with anything else raises ctypes.ArgumentError.
 
     Raises
     ------
