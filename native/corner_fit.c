@@ -11,6 +11,14 @@
 /* Of the last step: a step back that is longer has overshot, and from then on steps are halved. */
 #define MOST_SWING 0.5
 
+/* px: from places on this grid single precision holds the distance of every pixel, below 32 px, to the last bit. */
+#define GRID (1.0 / (1 << 19))
+
+static void put_on_grid(double *p) {
+    p[AT_X] = rint(p[AT_X] / GRID) * GRID;
+    p[AT_Y] = rint(p[AT_Y] / GRID) * GRID;
+}
+
 /* How far the corner goes. */
 static double length(const double *step) { return sqrt(step[AT_X] * step[AT_X] + step[AT_Y] * step[AT_Y]); }
 
@@ -43,6 +51,7 @@ static int fit(const Image *image, double *p, const double *bends, const double 
     double best = INFINITY, calm = 1.0, step[PARAMETERS] = {0.0};
     Normal normal;
     for (int steps = 0; steps < most_steps; steps++) {
+        put_on_grid(p);
         if (!gather(image, p, size, window) || window->count < 3 * PARAMETERS)
             return OUTSIDE;
         double weight = differentiate(p, bends, size, window);
@@ -82,7 +91,7 @@ static int fit(const Image *image, double *p, const double *bends, const double 
  * bends       (count, 2) 1/px, curvature of each edge
  * sizes       (count, 4) px: half the window along each edge; how far from an edge, in the direction of the other,
  *             pixels count at all
- * tolerance   of the place, px
+ * tolerance   of the place, px; above the grid
  * examine     whether all that is found is wanted, not only the status
  * found       (count, DIAGNOSTICS) in: zeros
  */

@@ -55,7 +55,7 @@ typedef struct {
 
 /* The pixels of a window: x and y from the corner on, grey level, and, each times the root of the pixel's weight, the
  * derivatives by each parameter and the residual. The derivative by a is the root of the weight. Single precision, with
- * which twice as many pixels are done at once, moves a corner by some 1e-6 px. */
+ * which twice as many pixels are done at once, moves a corner by some 1e-8 px. */
 typedef struct {
     int count;
     float x[MOST_PIXELS], y[MOST_PIXELS], level[MOST_PIXELS];

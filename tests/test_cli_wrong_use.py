@@ -80,8 +80,7 @@ def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, c
         answer(capsys, "calibrate", photographs, "--board", f"checkerboard:{size}:30mm") for size in ("9x6", "6x9")
     ]
     values = [np.array(list(printed["camera"]["params"].values())) for printed in named]
-    # corners are fitted in single precision, one edge after the other: a thousandth of what the camera is known to
-    np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt"])

@@ -76,7 +76,7 @@ HALF = np.array([[9.3, 8.1, np.inf, np.inf]])
 
 def fitted(photograph: Floats, bends: Floats = BENDS, half: Floats = HALF) -> tuple[Floats, Floats]:
     p = (MODEL + 40 * np.eye(2, PARAMETERS).sum(axis=0))[None]
-    found = fit_corners(photograph, WHITE, p, bends[None], half, 1e-6, 60, examine=True)
+    found = fit_corners(photograph, WHITE, p, bends[None], half, 5e-6, 60, examine=True)
     assert found[0, 0] == 0
     return p[0], found[0]
 
