@@ -72,9 +72,8 @@ class Evidence:
 
     def __str__(self) -> str:
         return (
-            f"odd and even views differ by {self.given_halves_px:.2g} px over the image with the board as given, by "
-            f"{self.solved_halves_px:.2g} px with its shape, and solving for it moves the camera by "
-            f"{self.moved_px:.2g} px, chance by {self.sigma_px:.2g} px (all rms)"
+            f"solving for its shape moves the camera by {self.moved_px:.2g} px (chance: {self.sigma_px:.2g} px), and "
+            f"halves of the views then differ by {self.solved_halves_px:.2g} instead of {self.given_halves_px:.2g} px"
         )
 
 

@@ -37,5 +37,5 @@ class Environment:
 
     def plugins(self) -> set[tuple[str, str]]:
         """Kind and name of all that is provided there."""
-        listed = json.loads(self.run("-m", "opencsp_calib", "plugins", "--json").stdout)
+        listed = json.loads(self.run("-m", "opencsp_calib", "plugins", "--json").stdout)["plugins"]
         return {(entry["kind"], entry["name"]) for entry in listed}

@@ -135,7 +135,9 @@ def test_foreign_and_damaged_files(camera_file: Path, tmp_path: Path, capsys: py
 
 def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     base = ("calibrate", photographs, "--board", SmallWorld.spec)
-    assert "--board" in complaint(capsys, "calibrate", photographs)
+    without_board = complaint(capsys, "calibrate", photographs)
+    assert "--board" in without_board
+    assert "checkerboard:18x23:50mm" in without_board
     assert "opencv6" in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, "--model", "opencv6")
     assert "'magic'" in complaint(capsys, *base, "--solver", "magic")
     assert "bundle" in complaint(capsys, *base, "--solver", "opencv", "--board-shape", "free")

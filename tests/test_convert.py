@@ -143,7 +143,7 @@ def test_a_guess_that_has_to_be_chosen_says_how(tmp_path: Path, capsys: pytest.C
 def test_formats_say_what_is_exact_and_what_is_fitted(capsys: pytest.CaptureFixture[str]) -> None:
     command("formats", "--json")
     said = capsys.readouterr()
-    by_name = {one["name"]: one for one in json.loads(said.out)}
+    by_name = {one["name"]: one for one in json.loads(said.out)["formats"]}
     assert by_name["kalibr"]["fitted"] == ["omni", "eucm", "ds", "fov"]
     assert by_name["kalibr"]["models"] == ["pinhole", "opencv4", "opencv_fisheye"]
     header = next(line for line in said.err.splitlines() if "read" in line)

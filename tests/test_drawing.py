@@ -134,7 +134,7 @@ def test_dots_black_in_part_are_grey(tmp_path: Path) -> None:
 
 def test_a_name_that_ends_in_nothing_known_is_refused(tmp_path: Path) -> None:
     for name in ("board.jpg", "board", "board.svgz"):
-        with pytest.raises(InputError, match=r"\.svg, \.pdf, \.png"):
+        with pytest.raises(InputError, match=r"\.svg, \.pdf or \.png"):
             write_board(CHECKERBOARD, drawn(CHECKERBOARD), tmp_path / name)
     with pytest.raises(InputError, match="does not exist"):
         write_board(CHECKERBOARD, drawn(CHECKERBOARD), tmp_path / "nowhere" / "board.svg")

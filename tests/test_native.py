@@ -1,6 +1,8 @@
 """The compiled part: that it is found, takes nothing it cannot read, and says the same on every processor."""
 
+import _ctypes
 import ctypes
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,13 @@ def test_one_that_is_older_than_its_sources_is_not_used(tmp_path: Path, monkeypa
     (tmp_path / "changed.c").write_text("int changed;\n", encoding="utf-8")
     monkeypatch.setattr(native, "SOURCES", tmp_path)
     with pytest.raises(MissingDependencyError, match="older than its sources: install opencsp-calib again"):
+        native._library.__wrapped__()
+
+
+def test_nor_is_one_that_is_too_old_to_say_of_what_it_was_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    shutil.copy(_ctypes.__file__, tmp_path / f"_native{native.SUFFIX}")  # any library
+    monkeypatch.setattr(native, "__file__", str(tmp_path / "native.py"))
+    with pytest.raises(MissingDependencyError, match="older than its sources"):
         native._library.__wrapped__()
 
 

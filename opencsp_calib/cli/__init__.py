@@ -8,6 +8,7 @@ import gc
 import os
 import sys
 import warnings
+from typing import Any
 
 import typer
 
@@ -81,9 +82,7 @@ def run(arguments: list[str]) -> int:
         if was_told():  # NumPy, for one, turns an interruption into a TypeError
             outcome = INTERRUPTED
         elif hasattr(error, "format_message"):  # the argument parser's
-            context = getattr(error, "ctx", None)
-            hint = f"; see `{context.command_path} --help`" if context else ""
-            complain(error.format_message().rstrip(".") + hint)
+            complain(_wrong_use(error))
             return 2
         else:  # a defect of ours, shown whole
             raise
@@ -91,3 +90,13 @@ def run(arguments: list[str]) -> int:
         complain("stopped; what was not finished was not written")
         return 1
     return outcome if isinstance(outcome, int) else 0
+
+
+def _wrong_use(error: Any) -> str:
+    """What the argument parser complains of, what to write where something is missing, and where to read more."""
+    message = error.format_message().rstrip(".")
+    wanted = getattr(getattr(error, "param", None), "help", None)
+    if type(error).__name__ == "MissingParameter" and wanted:
+        message += f": {wanted.rstrip('.')}"
+    context = getattr(error, "ctx", None)
+    return f"{message}; see `{context.command_path} --help`" if context else message

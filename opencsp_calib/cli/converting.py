@@ -79,7 +79,8 @@ def formats(json: args.Json = False) -> None:
     if json:
         keys = ("name", "title", "reads", "writes", "models", "extensions")
         more = [{"fitted": fitted[f.name], "missing": f.missing()} for f in known]
-        print_json([{key: getattr(f, key) for key in keys} | rest for f, rest in zip(known, more, strict=True)])
+        listed = [{key: getattr(f, key) for key in keys} | rest for f, rest in zip(known, more, strict=True)]
+        print_json({"formats": listed})
 
 
 COMMANDS = (convert, formats)

@@ -44,7 +44,7 @@ def plugins(json: args.Json = False) -> None:
             listed.append({"kind": what, "name": name, "plugin": origin, "missing": provided.missing()})
     say_table(("kind", "name", "plugin", "state"), rows)
     if json:
-        print_json(listed)
+        print_json({"plugins": listed})
 
 
 def demo(

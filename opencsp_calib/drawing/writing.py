@@ -40,7 +40,7 @@ def write_board(board: Board, drawing: Drawing, path: str | os.PathLike[str]) ->
     path = Path(path)
     writer = WRITERS.get(path.suffix.lower())
     if writer is None:
-        raise InputError(f"cannot write a board to {path}: let the name end in {', '.join(WRITERS)}")
+        raise InputError(f"a board is drawn as .svg, .pdf or .png, not as {path.name}")
     check_writable(path)
     page = page_of(board, drawing)
     with replacing(path) as temporary:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.board import Board
+from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.grid import known
@@ -46,9 +46,10 @@ def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
     found = f"{large}x{small}" if board.columns >= board.rows else f"{small}x{large}"
     other = whole or small > least or large > most
     if (small + 1, large + 1) == (least, most):
+        of_corners = Checkerboard(board.columns - 1, board.rows - 1, board.spacing_m)
         return Detection.nothing(
             f"the checkerboard found has {found} inner corners, not {wanted}, which counts its squares; "
-            f"inner corners are one less each way: write {board.kind}:{found}",
+            f"inner corners are one less each way: write {of_corners.spec}",
             other_board=other,
         )
     if other:

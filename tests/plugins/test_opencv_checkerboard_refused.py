@@ -70,7 +70,7 @@ def test_what_is_no_board_has_a_reason(kind: str) -> None:
     ("grid", "reason"),
     [
         ((10, 7), "has 9x6 inner corners, not 10x7, which counts its squares"),
-        ((7, 10), "write checkerboard:6x9"),
+        ((7, 10), "write checkerboard:6x9:50mm"),
         ((8, 6), "has 9x6 inner corners, not 8x6"),
         ((9, 7), "has 9x6 inner corners, not 9x7"),
         ((20, 20), "has 9x6 inner corners, not 20x20"),
