@@ -40,7 +40,7 @@ __all__ = [
 
 TOLD_APART = 1e-8  # smallest eigenvalue of the camera's scaled information, poses held, that leaves enough digits
 ROUNDING = 1e-15  # below this an eigenvalue is made of it
-KEPT = 32768  # corners: of so many, rows of J are kept (10 MB); of more, they are made again when they are needed
+KEPT = 81920  # corners: of so many, rows of J are kept (25 MB); of more, they are made again when they are needed
 
 Parts: TypeAlias = tuple[Floats, Floats, Floats]
 """A number for every unknown: (M,) of the shared ones, (C, 3) of the corners, (V, 6) of the poses."""

@@ -159,7 +159,8 @@ def _products(one: Pixels, other: Pixels) -> Matrix:
 def _robust_solution(design: Matrix, target: Floats) -> Floats:
     weights = np.ones(len(target))
     for _ in range(5):
-        solution = np.linalg.lstsq(design * weights[:, None], target * weights, rcond=None)[0]
+        weighted = (design * weights[:, None] ** 2).T
+        solution = np.linalg.lstsq(weighted @ design, weighted @ target, rcond=None)[0]
         residual = np.abs(target - design @ solution)
         weights = 1 / (1 + residual / (2 * np.median(residual) + 1e-9))
     return np.asarray(solution)

@@ -15,7 +15,7 @@ from opencsp_calib_opencv.grid import (
     trimmed,
 )
 from opencsp_calib_opencv.neighbours import Neighbours
-from opencsp_calib_opencv.rings import look
+from opencsp_calib_opencv.rings import Rings, look
 
 __all__ = ["belongs", "filled", "grown", "pruned"]
 
@@ -83,7 +83,11 @@ def _joined(grey: NDArray[np.float32], grid: Floats, saddles: Neighbours, distan
         foretold = np.where(known(foretold)[..., None], foretold, mean_known(predicted(foretold)))
     empty = ~known(grid) & known(foretold)
     off, nearest = (found[:, 0] for found in saddles.nearest(foretold[empty]))
-    hit = off < REACH * np.nan_to_num(square_height(foretold)[empty])
+    height = np.nan_to_num(square_height(foretold)[empty])
+    hit = off < REACH * height
+    hit[hit] = _corner_like(look(grey, saddles.pixels[nearest[hit]], _radii(ring * height[hit])), MOST_UNLIKENESS)
+    if not hit.any():
+        return grid
     tried = np.zeros_like(empty)
     tried[empty] = hit
     fuller = grid.copy()
@@ -98,8 +102,7 @@ def belongs(grey: NDArray[np.float32], grid: Floats, ring: float = RING) -> Mask
     if not there.any():
         return there
     down, on = (step[there] for step in steps(grid))
-    height = height_between(down, on)
-    rings = look(grey, grid[there], np.clip(np.nan_to_num(ring * height), SMALLEST_RING_PX, LARGEST_RING_PX))
+    rings = look(grey, grid[there], _radii(np.nan_to_num(ring * height_between(down, on))))
     row, column = np.nonzero(there)
     swapped = (row + column) % 2 == 1  # the first edge of one corner is the second of the next
     edges = np.where(swapped[:, None], rings.edges[:, ::-1], rings.edges)
@@ -107,10 +110,18 @@ def belongs(grey: NDArray[np.float32], grid: Floats, ring: float = RING) -> Mask
     straight = _turn(edges, angles) < MOST_TURN_RAD
     crossed = _turn(edges, angles[:, ::-1]) < MOST_TURN_RAD
     usual = USUAL_UNLIKENESS[0] + USUAL_UNLIKENESS[1] * float(np.median(rings.unlikeness))
-    good = rings.crossing & (rings.unlikeness < min(MOST_UNLIKENESS, usual))
+    good = _corner_like(rings, min(MOST_UNLIKENESS, usual))
     good &= rings.contrast > CONTRAST_FRACTION * np.median(rings.contrast)
     there[there] = good & (straight if straight.sum() >= crossed.sum() else crossed)
     return there
+
+
+def _radii(wanted: Floats) -> Floats:
+    return np.clip(wanted, SMALLEST_RING_PX, LARGEST_RING_PX)
+
+
+def _corner_like(rings: Rings, most_unlikeness: float) -> Mask:
+    return np.asarray(rings.crossing & (rings.unlikeness < most_unlikeness))
 
 
 def _turn(edges: Floats, angles: Floats) -> Floats:

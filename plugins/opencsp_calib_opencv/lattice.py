@@ -15,12 +15,12 @@ from opencsp_calib_opencv.saddles import Saddles
 __all__ = ["grids", "links"]
 
 NEAREST = 12  # a square's dirt and the margin's print may stand nearer than the next corner
-MOST_BEND_RAD = np.radians(17)  # of an edge from corner to corner: perspective, lens and the ring's own error
+TOO_NEAR_PX = 1e-3  # to tell a direction
+MOST_BEND = np.sin(np.radians(17))  # of an edge from corner to corner: perspective, lens and the ring's own error
 EDGE_FRACTION = 0.3  # of a corner's contrast, that its edges must have all along
 
 Links: TypeAlias = NDArray[np.int64]
 Cell: TypeAlias = tuple[int, int]
-Direction: TypeAlias = Sequence[float]  # x, y, of length 1
 
 
 def links(grey: NDArray[np.float32], saddles: Saddles) -> Links:
@@ -35,13 +35,13 @@ def links(grey: NDArray[np.float32], saddles: Saddles) -> Links:
         return found
     distance, near = Neighbours(saddles.pixels).nearest(saddles.pixels, min(NEAREST + 1, n))
     distance, near = distance[:, 1:], near[:, 1:]
-    towards = saddles.pixels[near] - saddles.pixels[:, None]
-    angle = np.arctan2(towards[..., 1], towards[..., 0])
+    towards = np.moveaxis(saddles.pixels[near] - saddles.pixels[:, None], -1, 0) / np.maximum(distance, TOO_NEAR_PX)
+    directions = np.stack([np.cos(saddles.edges), np.sin(saddles.edges)])
     for edge in (0, 1):
-        here, there = saddles.edges[:, edge, None], saddles.edges[near, 1 - edge]
-        bend, bend_there = _between_lines(angle, here), _between_lines(angle, there)
-        fits = (bend < MOST_BEND_RAD) & (bend_there < MOST_BEND_RAD)
-        ahead = np.cos(angle - here) > 0
+        here, there = directions[:, :, edge, None], directions[:, near, 1 - edge]
+        bend, bend_there = np.abs(_sine(towards, here)), np.abs(_sine(towards, there))
+        fits = (bend < MOST_BEND) & (bend_there < MOST_BEND)
+        ahead = (towards * here).sum(axis=0) > 0
         cost = distance * (1 + 2 * (bend + bend_there))
         for slot, side in ((2 * edge, ahead), (2 * edge + 1, ~ahead)):
             least = np.where(fits & side, cost, np.inf)
@@ -53,12 +53,10 @@ def links(grey: NDArray[np.float32], saddles: Saddles) -> Links:
 
 def grids(saddles: Saddles, links: Links) -> Iterator[Floats]:
     """Each connected grid as (m, n, 2) pixels, NaN where there is no corner."""
-    directions = np.stack([np.cos(saddles.edges), np.sin(saddles.edges)], axis=-1)
-    vectors = np.stack([directions[:, 0], -directions[:, 0], directions[:, 1], -directions[:, 1]], axis=1).tolist()
-    neighbours = links.tolist()
+    neighbours, ways_on = links.ravel().tolist(), _ways_on(saddles, links).ravel().tolist()
     free = set(np.nonzero((links >= 0).sum(axis=1) >= 2)[0].tolist())
     while free:
-        cells = _counted_off(min(free), neighbours, vectors)
+        cells = _counted_off(min(free), neighbours, ways_on)
         free -= cells.keys()
         at = np.array(list(cells.values()))
         at -= at.min(axis=0)
@@ -67,10 +65,11 @@ def grids(saddles: Saddles, links: Links) -> Iterator[Floats]:
         yield grid
 
 
-def _counted_off(
-    start: int, neighbours: Sequence[Sequence[int]], vectors: Sequence[Sequence[Direction]]
-) -> dict[int, Cell]:
-    """The cell of each corner that can be reached; where two ways disagree, the shorter counts."""
+def _counted_off(start: int, neighbours: Sequence[int], ways_on: Sequence[int]) -> dict[int, Cell]:
+    """The cell of each corner that can be reached; where two ways disagree, the shorter counts.
+
+    `neighbours` and `ways_on` are (n, 4) and (n, 4, 4), one number after the other.
+    """
     cells: dict[int, Cell] = {start: (0, 0)}
     taken: set[Cell] = {(0, 0)}
     queue = deque([(start, 0, 2)])  # and which of its four directions lead one row down, one column on
@@ -83,21 +82,21 @@ def _counted_off(
             (on, (row, column + 1)),
             (on ^ 1, (row, column - 1)),
         ):
-            other = neighbours[corner][slot]
+            link = 4 * corner + slot
+            other = neighbours[link]
             if other < 0 or other in cells or cell in taken:
                 continue
             cells[other] = cell
             taken.add(cell)
-            here, there = vectors[corner], vectors[other]
-            queue.append((other, _continued(here, there, down), _continued(here, there, on)))
+            queue.append((other, ways_on[4 * link + down], ways_on[4 * link + on]))
     return cells
 
 
-def _continued(here: Sequence[Direction], there: Sequence[Direction], slot: int) -> int:
-    """The next corner's direction that goes the same way: one of its other edge."""
-    ahead = slot ^ 2
-    (x, y), (u, v) = here[slot], there[ahead]
-    return ahead if x * u + y * v > 0 else ahead ^ 1
+def _ways_on(saddles: Saddles, links: Links) -> Links:
+    """(n, 4, 4) for each link, which direction of the next corner, one of its other edge, goes on in each of here."""
+    turn = saddles.edges[links][..., ::-1] - saddles.edges[:, None]
+    ahead = np.array([2, 0]) + (np.cos(turn) <= 0)
+    return np.stack([ahead, ahead ^ 1], axis=-1).reshape(*links.shape, 4)
 
 
 def _mutual_and_sharp(grey: NDArray[np.float32], saddles: Saddles, found: Links) -> Links:
@@ -120,5 +119,6 @@ def _along_edge(grey: NDArray[np.float32], saddles: Saddles, start: Links, end: 
     return np.asarray(np.where(dark_first[:, None], step, -step).min(axis=1) > least)
 
 
-def _between_lines(a: Floats, b: Floats) -> Floats:
-    return np.abs((a - b + np.pi / 2) % np.pi - np.pi / 2)
+def _sine(one: Floats, other: Floats) -> Floats:
+    """Of the angle between unit vectors (2, ...)."""
+    return np.asarray(one[0] * other[1] - one[1] * other[0])

@@ -42,25 +42,24 @@ class Rings:
     crossing: Mask
 
 
-def sample(grey: NDArray[np.float32], pixels: Pixels) -> Floats:
+def sample(grey: NDArray[np.float32], pixels: Floats | NDArray[np.float32]) -> NDArray[np.float32]:
     """Grey levels (n, m) at (n, m, 2) pixels between the image's own; good to a 32nd of a pixel, as `remap` is."""
     import cv2
 
     if pixels.size == 0:  # which OpenCV refuses
-        return np.zeros(pixels.shape[:-1])
+        return np.zeros(pixels.shape[:-1], dtype=np.float32)
     if len(pixels) > MOST_ROWS:
-        return np.concatenate([sample(grey, part) for part in np.split(pixels, [MOST_ROWS])])
-    x, y = np.moveaxis(pixels.astype(np.float32), -1, 0)
-    levels = cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-    return np.asarray(levels, dtype=np.float64)
+        return np.concatenate([sample(grey, pixels[:MOST_ROWS]), sample(grey, pixels[MOST_ROWS:])])
+    x, y = np.moveaxis(pixels.astype(np.float32, copy=False), -1, 0)
+    return np.asarray(cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE))
 
 
 def look(grey: NDArray[np.float32], pixels: Pixels, radii: Floats | float) -> Rings:
     """The rings around (n, 2) pixels, with radii (n,) in pixels."""
     angles = np.arange(SAMPLES) * (2 * np.pi / SAMPLES)
-    circle = np.column_stack([np.cos(angles), np.sin(angles)])
-    radii = np.broadcast_to(radii, len(pixels))
-    ring = sample(grey, pixels[:, None] + radii[:, None, None] * circle)
+    circle = np.column_stack([np.cos(angles), np.sin(angles)]).astype(np.float32)
+    radii = np.broadcast_to(np.asarray(radii, dtype=np.float32), len(pixels))
+    ring = sample(grey, pixels.astype(np.float32)[:, None] + radii[:, None, None] * circle)
     even, odd = (ring[:, :HALF] + ring[:, HALF:]) / 2, (ring[:, :HALF] - ring[:, HALF:]) / 2
     darkest, brightest = even.min(axis=1), even.max(axis=1)
     contrast = brightest - darkest
@@ -71,10 +70,10 @@ def look(grey: NDArray[np.float32], pixels: Pixels, radii: Floats | float) -> Ri
     dark = (edges[:, 1] - edges[:, 0]) % np.pi
     crossing = (falls.sum(axis=1) == 1) & (dark > NARROWEST_RAD) & (dark < np.pi - NARROWEST_RAD)
     unlikeness = np.sqrt((odd**2).mean(axis=1)) / np.maximum(contrast, 1e-12)
-    return Rings(edges, contrast, unlikeness, crossing)
+    return Rings(edges, contrast.astype(np.float64), unlikeness.astype(np.float64), crossing)
 
 
-def _place(change: Mask, before: Floats, after: Floats) -> Floats:
+def _place(change: Mask, before: NDArray[np.float32], after: NDArray[np.float32]) -> Floats:
     """(n,) rad, where the first marked change from sample to sample passes the middle grey."""
     rows, first = np.arange(len(change)), change.argmax(axis=1)
     start, end = before[rows, first], after[rows, first]

@@ -14,7 +14,7 @@ ORDERS = ((150, 7), (80, 5), (24, 3))  # fewest corners for an order of polynomi
 
 
 def smooth_part(grid: Floats) -> Floats:
-    """The grid without the corners that a homography, bent by a polynomial of low order, does not explain.
+    """The grid without the corners that a homography, if need be bent by a polynomial of low order, does not explain.
 
     Which corners those are is found by leaving out the worst until the others agree; too few to tell are kept.
     """
@@ -24,7 +24,7 @@ def smooth_part(grid: Floats) -> Floats:
     while there.sum() >= FEWEST_CORNERS:
         grid = np.where(there[..., None], grid, np.nan)
         allowed = MOST_MISFIT * square_height(grid)[there] + MOST_MISFIT_PX
-        misfit = np.nan_to_num(_misfit(grid, there) / allowed, nan=np.inf)
+        misfit = np.nan_to_num(_misfit(grid, there, allowed) / allowed, nan=np.inf)
         worst = misfit.max()
         if worst <= 1:
             return grid
@@ -32,8 +32,8 @@ def smooth_part(grid: Floats) -> Floats:
     return np.full_like(grid, np.nan)
 
 
-def _misfit(grid: Floats, there: Mask) -> Floats:
-    """(k,) px, of the corners that are there."""
+def _misfit(grid: Floats, there: Mask, allowed: Floats) -> Floats:
+    """(k,) px, of the corners that are there; of the homography alone where that is all that is allowed."""
     import cv2
 
     row, column = np.nonzero(there)
@@ -45,10 +45,11 @@ def _misfit(grid: Floats, there: Mask) -> Floats:
         return np.full(len(pixels), np.inf)
     left = pixels - cv2.perspectiveTransform(across[None], homography)[0]
     order = next((order for fewest, order in ORDERS if len(pixels) >= fewest), None)
-    if order:
+    misfit = np.linalg.norm(left, axis=1)
+    if order and not (misfit <= allowed).all():
         terms = _products(across, order)
-        left = left - terms @ np.linalg.lstsq(terms, left, rcond=None)[0]
-    return np.asarray(np.linalg.norm(left, axis=1))
+        misfit = np.linalg.norm(left - terms @ np.linalg.lstsq(terms, left, rcond=None)[0], axis=1)
+    return np.asarray(misfit)
 
 
 def _products(across: Matrix, order: int) -> Matrix:
