@@ -11,6 +11,9 @@ shape. Two things tell whether it is worth its price:
     way is held against one that is right only if the board is flat: Hausman 1978.) What chance explains is the
     jackknife sigma of the move itself: how far it changes when each view in turn is left out.
 
+Neither counts where solving moves the camera by next to nothing: what all views' corners are wrong by in the same way
+does as much, and no more views make it less.
+
 Nothing of that needs a solution with the shape. One Newton step from the one without it goes to it within a hundredth,
 and where it would not, the board is so bent that there is nothing to decide. The steps of the halves, and of all views
 but one, are solved for in the same normal equations.
@@ -35,6 +38,7 @@ __all__ = ["Evidence", "evidence_of"]
 
 CLEARLY = 1.5  # two halves are one draw of a figure that scatters by about half: less is chance
 SIGMAS = 2.0  # a camera that moves by more has, by about 20 to 1, a bias that outweighs what the shape adds to chance
+LEAST_MOVE_PX = 0.003  # twice what corners in sharp photographs are wrong by on average (validation/results/corners.md)
 CLOSE = 1e-2  # of a step: jackknife sigmas scatter by a part of 1/sqrt(2 V), 10 % of 50 views
 
 
@@ -67,10 +71,17 @@ class Evidence:
 
     @property
     def for_shape(self) -> bool:
-        """Whether one of the two speaks for it."""
-        return self.by_halves or self.by_move
+        """Whether one of the two speaks for it, and it is worth solving for."""
+        return self.matters and (self.by_halves or self.by_move)
+
+    @property
+    def matters(self) -> bool:
+        """Whether solving for the shape moves the camera by more than errors that the corners of all views share."""
+        return self.moved_px > LEAST_MOVE_PX
 
     def __str__(self) -> str:
+        if not self.matters:
+            return f"solving for its shape moves the camera by {self.moved_px:.2g} px, less than corners are good to"
         return (
             f"solving for its shape moves the camera by {self.moved_px:.2g} px (chance: {self.sigma_px:.2g} px), and "
             f"halves of the views then differ by {self.solved_halves_px:.2g} instead of {self.given_halves_px:.2g} px"

@@ -55,3 +55,12 @@ def test_a_bias_that_both_halves_share_is_found_out() -> None:
     assert all(one.for_shape for one in found)
     for one, other in zip(flat, free, strict=True):
         assert compare(one.camera, CAMERA).rms_px > 5 * compare(other.camera, CAMERA).rms_px
+
+
+def test_a_move_that_corners_are_not_good_to_is_no_reason() -> None:
+    """Without noise chance explains nothing, so that rounding, or half a micrometre, would speak for the shape."""
+    for bow_m in (0.0, 5e-7):
+        found = evidence_of(solved(world(12, bow_m, 0.0), FLAT), FREE)
+        assert not found.for_shape
+        assert "less than corners are good to" in str(found)
+    assert evidence_of(solved(world(12, 2e-5, 0.0), FLAT), FREE).for_shape
