@@ -12,13 +12,9 @@ def known(grid: Floats) -> Mask:
     return np.asarray(~np.isnan(grid[..., 0]))
 
 
-def mean_known(stack: Floats) -> Floats:
-    """Mean over the first axis of what is not NaN; NaN where nothing is."""
-    there = ~np.isnan(stack)
-    count = there.sum(axis=0)
-    total = np.where(there, stack, 0).sum(axis=0)
-    count = np.where(count > 0, count, np.nan)
-    return np.asarray(total / count)
+def mean_known(one: Floats, other: Floats) -> Floats:
+    """The mean of two where both are known, else the one that is; NaN where none is."""
+    return np.where(np.isnan(one), other, np.where(np.isnan(other), one, (one + other) / 2))
 
 
 def padded(grid: Floats, width: int) -> Floats:
@@ -62,7 +58,7 @@ def predicted(grid: Floats) -> Floats:
             straight, curved = 2 * first - second, 3 * (first - second) + third
             ends.append(np.where(np.isnan(curved), straight, curved))
         between = (moved(down, on) + moved(-down, -on)) / 2
-        lines.append(np.where(np.isnan(between), mean_known(np.stack(ends)), between))
+        lines.append(np.where(np.isnan(between), mean_known(*ends), between))
     return np.stack(lines)
 
 
@@ -70,8 +66,8 @@ def steps(grid: Floats) -> tuple[Floats, Floats]:
     """(m, n, 2) the steps one row down and one column on at each corner; NaN where no neighbour is known."""
     around = padded(grid, 1)
     here = around[1:-1, 1:-1]
-    down = mean_known(np.stack([around[2:, 1:-1] - here, here - around[:-2, 1:-1]]))
-    on = mean_known(np.stack([around[1:-1, 2:] - here, here - around[1:-1, :-2]]))
+    down = mean_known(around[2:, 1:-1] - here, here - around[:-2, 1:-1])
+    on = mean_known(around[1:-1, 2:] - here, here - around[1:-1, :-2])
     return down, on
 
 

@@ -80,7 +80,7 @@ def _joined(grey: NDArray[np.float32], grid: Floats, saddles: Neighbours, distan
     """With the saddles that stand where a corner should be, up to so many steps from the known ones."""
     foretold = grid
     for _ in range(distance):
-        foretold = np.where(known(foretold)[..., None], foretold, mean_known(predicted(foretold)))
+        foretold = np.where(known(foretold)[..., None], foretold, mean_known(*predicted(foretold)))
     empty = ~known(grid) & known(foretold)
     off, nearest = (found[:, 0] for found in saddles.nearest(foretold[empty]))
     height = np.nan_to_num(square_height(foretold)[empty])
