@@ -1,46 +1,14 @@
 """The compiled fit of a corner, against the same model and the same sums written down in NumPy and double precision."""
 
-from ctypes import c_int64
-
 import numpy as np
 import pytest
+from corner_model import BENDS, CENTRED, MODEL, columns, image, normal_equations, photograph_of, seen
 from scipy.ndimage import map_coordinates
-from scipy.special import erf
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.corner_kernel import PARAMETERS, RAMP_PX, fit_corners
-from opencsp_calib.native import array_of, native_function, result_of
+from opencsp_calib.corner_kernel import PARAMETERS, fit_corners
 
-MODEL = np.array([0.2, -0.1, 0.15, 1.3, 1.3, 100.0, 60.0, 0.03, -0.02, 1.0, -0.8])  # light far steeper than any
-BENDS = np.array([0.002, -0.001])
-FAR = np.array([100.0, 100.0, np.inf, np.inf])
 WHITE = 200.0
-
-
-def columns(p: Floats, x: Floats, y: Floats, bends: Floats = BENDS, window: Floats = FAR) -> Floats:
-    """The derivatives by each parameter and the residual of black pixels at (x, y) from the corner on."""
-    line = array_of(np.float64, 1)
-    corner_image = native_function("corner_image", line, line, line, c_int64, line, line, result_of(np.float64, 2))
-    made = np.empty((PARAMETERS + 1, len(x)))
-    corner_image(p, bends, window, len(x), x, y, made)
-    return made
-
-
-def image(p: Floats, x: Floats, y: Floats, bends: Floats = BENDS) -> Floats:
-    """The model's grey levels at (x, y) from the corner on."""
-    edges, profiles, slopes, zs = [], [], [], []
-    for angle, bend in zip(p[2:4], bends, strict=True):
-        cosine, sine = np.cos(angle), np.sin(angle)
-        z = (y * cosine - x * sine - bend / 2 * (x * cosine + y * sine) ** 2) / p[4]
-        box = -(cosine**4 + sine**4) / 120 / 12 / p[4] ** 4  # fourth cumulant of a pixel across the edge, over 4!/2
-        bell = np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi)
-        zs.append(z)
-        profiles.append(erf(z / np.sqrt(2)) - box * (z**3 - 3 * z) * bell)
-        slopes.append((2 + box * (z**4 - 6 * z**2 + 3)) * bell)
-        edges.append((cosine, sine))
-    lean = np.dot(*edges)
-    pattern = profiles[0] * profiles[1] + lean * slopes[0] * slopes[1] * (1 + lean / 2 * zs[0] * zs[1])
-    return p[5] + p[7] * x + p[8] * y + (p[6] + p[9] * x + p[10] * y) * pattern
 
 
 @pytest.mark.parametrize("second_edge", [0.15 + np.pi / 2, 1.3, -2.2])
@@ -61,21 +29,16 @@ def test_the_model_and_its_derivatives(second_edge: float) -> None:
 @pytest.fixture(scope="module")
 def photograph() -> Floats:
     """A corner at (40.2, 39.9), noise that is alike in no way, a bright spot in one quarter."""
-    grey = clean() + np.random.default_rng(2).normal(0, 3, (80, 80))
+    grey = photograph_of(CENTRED) + np.random.default_rng(2).normal(0, 3, (80, 80))
     grey[46:49, 44:50] = 230
     return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
-
-
-def clean() -> Floats:
-    y, x = np.mgrid[:80, :80] - 40.0
-    return image(MODEL, x - MODEL[0], y - MODEL[1])
 
 
 HALF = np.array([[9.3, 8.1, np.inf, np.inf]])
 
 
 def fitted(photograph: Floats, bends: Floats = BENDS, half: Floats = HALF) -> tuple[Floats, Floats]:
-    p = (MODEL + 40 * np.eye(2, PARAMETERS).sum(axis=0))[None]
+    p = CENTRED[None].copy()
     found = fit_corners(photograph, WHITE, p, bends[None], half, 5e-6, 60, examine=True)
     assert found[0, 0] == 0
     return p[0], found[0]
@@ -84,34 +47,21 @@ def fitted(photograph: Floats, bends: Floats = BENDS, half: Floats = HALF) -> tu
 @pytest.fixture(scope="module")
 def window(photograph: Floats) -> tuple[Floats, Floats, Floats, Floats]:
     """Of the pixels within the window: row, column, derivatives, residual times the root of the weight."""
-    p, _ = fitted(photograph)
-    row, column = np.mgrid[:80, :80].reshape(2, -1)
-    x, y = column - p[0], row - p[1]
-    across = [y * np.cos(angle) - x * np.sin(angle) for angle in p[2:4]]
-    along = np.abs(across[::-1] / np.sin(p[3] - p[2]))
-    inside = (along < HALF[0, :2, None] + RAMP_PX / 2).all(axis=0)
-    row, column, x, y = row[inside], column[inside], x[inside], y[inside]
-    made = columns(p, x, y, window=HALF[0])
-    return row, column, made[:-1], made[-1] + made[5] * photograph[row, column]
+    return seen(photograph, fitted(photograph)[0], HALF[0])
 
 
 def test_how_sure_a_place_is(photograph: Floats, window: tuple[Floats, ...]) -> None:
     p, found = fitted(photograph)
     _, _, derivatives, residual = window
-    normal = derivatives @ derivatives.T
-    variance = residual @ residual / (derivatives[5] ** 2).sum()
-    usual = np.array([0.02, 0.02, 0.002, 0.002]) * p[6]  # gradients, known before looking
-    normal[range(7, 11), range(7, 11)] += variance / usual**2
+    normal, gradient = normal_equations(p, derivatives, residual)
     inverse = np.linalg.inv(normal)
     assert found[3:6] == pytest.approx([inverse[0, 0], inverse[0, 1], inverse[1, 1]], rel=1e-4)
     # and nothing is left to be done
-    gradient = derivatives @ residual
-    gradient[7:] -= variance / usual**2 * p[7:]
     assert np.abs(inverse @ gradient)[:4].max() < 1e-4
 
 
 def test_how_a_place_follows_the_bend_of_its_edges() -> None:
-    photograph = np.rint(200 * clean()).astype(np.uint16)
+    photograph = np.rint(200 * photograph_of(CENTRED)).astype(np.uint16)
     _, found = fitted(photograph)
     for edge in range(2):
         step = np.eye(2)[edge] * 1e-3

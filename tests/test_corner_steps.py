@@ -1,0 +1,160 @@
+"""The steps of a corner's fit: each is Gauss-Newton's, none goes too far, the first that is short enough ends it."""
+
+import numpy as np
+import pytest
+from corner_model import BENDS, CENTRED, normal_equations, photograph_of, seen
+
+from opencsp_calib.arrays import Floats
+from opencsp_calib.corner_kernel import PARAMETERS, fit_corners
+
+HALF = np.array([9.3, 8.1, np.inf, np.inf])
+DIM = np.array([*CENTRED[:5], 30.0, 4.0, 0.03, -0.02, 0.01, -0.008])  # in which a unit too much is not lost
+CONVERGED, OUTSIDE, FAILED = 0, 1, 2
+
+
+def moved(p: Floats, **by: float) -> Floats:
+    names = ("x", "y", "angle_1", "angle_2", "blur", "a", "b", "a_by_x", "a_by_y", "b_by_x", "b_by_y")
+    return p + [by.get(name, 0.0) for name in names]
+
+
+def after(
+    photograph: Floats, start: Floats, steps: int = 1, tolerance: float = 1e-5, half: Floats = HALF
+) -> tuple[Floats, int]:
+    """The parameters after so many steps, and the status."""
+    p = start[None].copy()
+    found = fit_corners(photograph, 255, p, BENDS[None], half[None], tolerance, steps, examine=False)
+    return p[0], int(found[0, 0])
+
+
+def newton(photograph: Floats, p: Floats, half: Floats = HALF) -> Floats:
+    """The whole step from there."""
+    _, _, derivatives, residual = seen(photograph, p, half)
+    return np.linalg.solve(*normal_equations(p, derivatives, residual))
+
+
+def grey(p: Floats) -> Floats:
+    return np.rint(photograph_of(p)).astype(np.uint8)
+
+
+@pytest.mark.parametrize("half", [HALF, [3.2, 11.7, np.inf, np.inf], [9.3, 9.3, 5.4, 3.2]])
+def test_a_short_step_is_gauss_newtons(half: Floats) -> None:
+    photograph, start = grey(DIM), moved(DIM, x=0.25, y=-0.125, angle_1=0.03, angle_2=-0.02, blur=0.1, a=0.5, b=-0.3)
+    step = newton(photograph, start, np.asarray(half))
+    p, status = after(photograph, start, half=np.asarray(half))
+    assert status == FAILED  # it has not ended yet
+    assert p - start == pytest.approx(step, rel=1e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("off", "limit"),
+    [
+        ({"x": 3.0}, lambda p, step: 1.5 / np.hypot(*step[:2])),
+        ({"x": 1.5, "y": 2.0}, lambda p, step: 1.5 / np.hypot(*step[:2])),
+        ({"angle_1": 0.5}, lambda p, step: 0.3 / abs(step[2])),
+        ({"angle_2": -0.5}, lambda p, step: 0.3 / abs(step[3])),
+        ({"blur": -2.0}, lambda p, step: 0.6 * p[4] / abs(step[4])),
+    ],
+)
+def test_a_long_step_is_cut_to_where_the_model_is_nearly_linear(off: dict[str, float], limit) -> None:
+    soft = moved(CENTRED, blur=1.7)
+    photograph, start = grey(soft), moved(soft, **off)
+    step = newton(photograph, start)
+    fraction = limit(start, step)
+    assert fraction < 1
+    p, _ = after(photograph, start)
+    assert p - start == pytest.approx(fraction * step, rel=1e-3, abs=1e-5)
+
+
+def test_no_corner_gets_sharper_than_a_pixel_can_see() -> None:
+    """And the other parameters go where they would if the blur were known."""
+    photograph, start = grey(moved(CENTRED, blur=-1.05)), moved(CENTRED, x=0.125)
+    start[4] = 0.3
+    _, _, derivatives, residual = seen(photograph, start, HALF)
+    normal, gradient = normal_equations(start, derivatives, residual)
+    assert gradient[4] < 0
+    others = np.arange(PARAMETERS) != 4
+    step = np.linalg.solve(normal[np.ix_(others, others)], gradient[others])
+    p, _ = after(photograph, start)
+    assert p[4] == 0.3
+    assert (p - start)[others] == pytest.approx(step, rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("off", "steps"),
+    [
+        ({"x": -4.9, "y": 3.6, "angle_1": 0.5, "blur": 1.9}, 1),
+        ({"x": 4.5, "y": -4.7, "angle_1": -0.5, "blur": -0.7}, 2),
+    ],
+)
+def test_a_step_that_makes_it_worse_is_halved(off: dict[str, float], steps: int) -> None:
+    photograph, start = grey(CENTRED), moved(CENTRED, **off)
+    (before, _), (once, _), (twice, _) = (after(photograph, start, n) for n in (steps - 1, steps, steps + 1))
+    assert 1.2 < misfit(photograph, once) / misfit(photograph, before) < 1.4
+    assert twice - before == pytest.approx((once - before) / 2, rel=1e-4, abs=1e-5)
+
+
+def misfit(photograph: Floats, p: Floats) -> float:
+    _, _, derivatives, residual = seen(photograph, p, HALF)
+    return float(residual @ residual / (derivatives[5] ** 2).sum())
+
+
+@pytest.mark.parametrize(
+    ("off", "measure", "allowed"),
+    [
+        ({"x": 0.25, "y": 0.5}, lambda step: np.hypot(*step[:2]), 1),
+        ({"blur": 0.05}, lambda step: abs(step[4]), 10),
+    ],
+)
+def test_it_ends_with_the_first_step_that_is_within_the_tolerance(off: dict[str, float], measure, allowed) -> None:
+    photograph, start = grey(CENTRED), moved(CENTRED, **off)
+    step = newton(photograph, start)
+    tolerance = measure(step) / allowed
+    (p, status), (_, too_long) = (after(photograph, start, tolerance=part * tolerance) for part in (1.01, 0.99))
+    assert (status, too_long) == (CONVERGED, FAILED)
+    assert p - start == pytest.approx(step, rel=1e-3, abs=1e-4)  # which is still taken
+
+
+@pytest.mark.parametrize("name", ["a", "b"])
+def test_grey_levels_that_still_change_have_not_been_judged(name: str) -> None:
+    photograph = grey(CENTRED)
+    ends = {}
+    for share in (0.04, 0.06):
+        start = moved(CENTRED, **{name: share * CENTRED[6]})
+        step = newton(photograph, start)
+        assert (abs(step[5]) + abs(step[6]) < 0.05 * start[6]) == (share < 0.05)
+        ends[share] = after(photograph, start, tolerance=1.0)[1]
+    assert ends == {0.04: CONVERGED, 0.06: FAILED}
+
+
+UPRIGHT = np.array([40.0, 40.0, 0.0, np.pi / 2, 1.0, 100.0, 60.0, 0.0, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("at", "columns", "rows", "enough"),
+    [(0.0, 3, 11, True), (0.5, 4, 8, False), (0.5, 32, 34, True), (0.0, 33, 33, False)],
+)
+def test_a_window_has_three_pixels_for_each_parameter_and_no_more_than_there_is_room_for(
+    at: float, columns: int, rows: int, enough: bool
+) -> None:
+    """33 and 1088."""
+    start = moved(UPRIGHT, x=at, y=at)
+    half = np.array([columns / 2 - 0.85, rows / 2 - 0.85, np.inf, np.inf])  # the ramp adds 0.75 px
+    _, status = after(grey(start), start, half=half)
+    assert (status != OUTSIDE) == enough
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+@pytest.mark.parametrize("end", ["near", "far"])
+def test_a_window_may_reach_the_border_of_the_image_and_no_farther(axis: int, end: str) -> None:
+    photograph = grey(UPRIGHT)[:70]
+    half, sides = np.array([6.25, 8.25, np.inf, np.inf]), (80, 70)
+    for beyond in (-1e-3, 1e-3):
+        start = UPRIGHT.copy()
+        reach = half[axis] + 0.75 - beyond
+        start[axis] = reach if end == "near" else sides[axis] - 1 - reach
+        assert (after(photograph, start, half=half)[1] == OUTSIDE) == (beyond > 0)
+
+
+def test_what_has_no_second_edge_cannot_be_fitted() -> None:
+    flat = np.full((80, 80), 100, np.uint8)
+    assert after(flat, UPRIGHT, steps=20)[1] == FAILED
