@@ -11,6 +11,8 @@ from opencsp_calib.native import array_of, native_function, result_of
 
 MODEL = np.array([0.2, -0.1, 0.15, 1.3, 1.3, 100.0, 60.0, 0.03, -0.02, 1.0, -0.8])  # light far steeper than any
 CENTRED = MODEL + 40 * np.eye(2, PARAMETERS).sum(axis=0)  # in an image of 80x80 pixels
+DIM = np.array([*CENTRED[:5], 30.0, 4.0, 0.03, -0.02, 0.01, -0.008])
+UPRIGHT = np.array([40.0, 40.0, 0.0, np.pi / 2, *DIM[4:]])  # along the pixels
 BENDS = np.array([0.002, -0.001])
 FAR = np.array([100.0, 100.0, np.inf, np.inf])
 

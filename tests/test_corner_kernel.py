@@ -1,14 +1,14 @@
 """The compiled fit of a corner, against the same model and the same sums written down in NumPy and double precision."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
-from corner_model import BENDS, CENTRED, MODEL, columns, image, normal_equations, photograph_of, seen
+from corner_model import BENDS, CENTRED, MODEL, UPRIGHT, columns, image, normal_equations, photograph_of, seen
 from scipy.ndimage import map_coordinates
 
-from opencsp_calib.arrays import Floats
+from opencsp_calib.arrays import Floats, Ids
 from opencsp_calib.corner_kernel import PARAMETERS, fit_corners
-
-WHITE = 200.0
 
 
 @pytest.mark.parametrize("second_edge", [0.15 + np.pi / 2, 1.3, -2.2])
@@ -26,58 +26,77 @@ def test_the_model_and_its_derivatives(second_edge: float) -> None:
         assert np.abs(numeric - found[k]).max() < (0.04 if k < 5 else 1e-4) * np.abs(found[k]).max()
 
 
-@pytest.fixture(scope="module")
-def photograph() -> Floats:
-    """A corner at (40.2, 39.9), noise that is alike in no way, a bright spot in one quarter."""
-    grey = photograph_of(CENTRED) + np.random.default_rng(2).normal(0, 3, (80, 80))
-    grey[46:49, 44:50] = 230
-    return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
+@dataclass(frozen=True)
+class Fitted:
+    """A corner in a photograph, what was found of it, and its window's pixels: where, derivatives and residual."""
+
+    photograph: Floats
+    white: float
+    p: Floats
+    found: Floats
+    row: Ids
+    column: Ids
+    derivatives: Floats
+    residual: Floats
 
 
-HALF = np.array([[9.3, 8.1, np.inf, np.inf]])
-
-
-def fitted(photograph: Floats, bends: Floats = BENDS, half: Floats = HALF) -> tuple[Floats, Floats]:
-    p = CENTRED[None].copy()
-    found = fit_corners(photograph, WHITE, p, bends[None], half, 5e-6, 60, examine=True)
+def fit(photograph: Floats, white: float, start: Floats, half: Floats, bends: Floats = BENDS) -> Fitted:
+    p, window = start[None].copy(), np.array([*half, np.inf, np.inf])
+    found = fit_corners(photograph, white, p, bends[None], window[None], 5e-6, 60, examine=True)
     assert found[0, 0] == 0
-    return p[0], found[0]
+    return Fitted(photograph, white, p[0], found[0], *seen(photograph, p[0], window, bends))
 
 
-@pytest.fixture(scope="module")
-def window(photograph: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-    """Of the pixels within the window: row, column, derivatives, residual times the root of the weight."""
-    return seen(photograph, fitted(photograph)[0], HALF[0])
+@pytest.fixture(scope="module", params=["bright", "dim"])
+def fitted(request: pytest.FixtureRequest) -> Fitted:
+    """With noise that is alike in no way, and a bright spot in one quarter.
+
+    In the dim one a unit more in a sum is not lost, and the first and the last pixel of the window weigh something.
+    """
+    start, half, noise, spot, white = (
+        (CENTRED, (9.3, 8.1), 3.0, 230, 200.0) if request.param == "bright" else (UPRIGHT, (9.0, 8.0), 0.5, 36, 35.0)
+    )
+    grey = photograph_of(start) + np.random.default_rng(2).normal(0, noise, (80, 80))
+    grey[46:49, 44:50] = spot
+    return fit(np.clip(np.rint(grey), 0, 255).astype(np.uint8), white, start, half)
 
 
-def test_how_sure_a_place_is(photograph: Floats, window: tuple[Floats, ...]) -> None:
-    p, found = fitted(photograph)
-    _, _, derivatives, residual = window
-    normal, gradient = normal_equations(p, derivatives, residual)
+def test_how_sure_a_place_is(fitted: Fitted) -> None:
+    normal, gradient = normal_equations(fitted.p, fitted.derivatives, fitted.residual)
     inverse = np.linalg.inv(normal)
-    assert found[3:6] == pytest.approx([inverse[0, 0], inverse[0, 1], inverse[1, 1]], rel=1e-4)
+    assert fitted.found[3:6] == pytest.approx([inverse[0, 0], inverse[0, 1], inverse[1, 1]], rel=1e-4)
     # and nothing is left to be done
     assert np.abs(inverse @ gradient)[:4].max() < 1e-4
 
 
 def test_how_a_place_follows_the_bend_of_its_edges() -> None:
-    photograph = np.rint(200 * photograph_of(CENTRED)).astype(np.uint16)
-    _, found = fitted(photograph)
+    turned = CENTRED + np.eye(PARAMETERS)[2:4].sum(axis=0) * 0.6
+    photograph, half = np.rint(200 * photograph_of(turned)).astype(np.uint16), (9.3, 8.1)
+    found = fit(photograph, 65535, turned, half).found
     for edge in range(2):
         step = np.eye(2)[edge] * 1e-3
-        (before, _), (after, _) = (fitted(photograph, BENDS + way * step) for way in (-1, 1))
+        before, after = (fit(photograph, 65535, turned, half, BENDS + way * step).p for way in (-1, 1))
         assert found[[6 + edge, 8 + edge]] == pytest.approx((after - before)[:2] / 2e-3, abs=0.5)  # of 15
 
 
-def test_what_disturbs_it(photograph: Floats, window: tuple[Floats, ...]) -> None:
-    p, found = fitted(photograph)
-    row, column, derivatives, residual = window
-    root = derivatives[5]
+def test_how_it_follows_bends_by_the_derivatives(fitted: Fitted) -> None:
+    """A bend moves an edge like a turn by half of it for each pixel from the corner on."""
+    normal, _ = normal_equations(fitted.p, fitted.derivatives, fitted.residual)
+    x, y = fitted.column - fitted.p[0], fitted.row - fitted.p[1]
+    for edge, angle in enumerate(fitted.p[2:4]):
+        by_bend = 0.5 * fitted.derivatives[2 + edge] * (x * np.cos(angle) + y * np.sin(angle))
+        response = -np.linalg.solve(normal, fitted.derivatives @ by_bend)
+        assert fitted.found[[6 + edge, 8 + edge]] == pytest.approx(response[:2], rel=1e-4, abs=1e-4)
+
+
+def test_what_disturbs_it(fitted: Fitted) -> None:
+    p, row, column, residual, found = fitted.p, fitted.row, fitted.column, fitted.residual, fitted.found
+    root = fitted.derivatives[5]
     x, y = column - p[0], row - p[1]
     sides = [y * np.cos(angle) > x * np.sin(angle) for angle in p[2:4]]
     quarters = [(sides[0] == one) & (sides[1] == other) for one in (False, True) for other in (False, True)]
     weights = np.array([(root[quarter] ** 2).sum() for quarter in quarters])
-    saturated = root**2 * (photograph[row, column] >= WHITE)
+    saturated = root**2 * (fitted.photograph[row, column] >= fitted.white)
     assert found[18:22] == pytest.approx(weights, rel=1e-4)
     assert found[14:18] == pytest.approx([saturated[q].sum() for q in quarters] / weights, rel=1e-4)
     misfit = np.array([(root * residual)[quarter].sum() for quarter in quarters]) / weights / abs(p[6])
@@ -91,3 +110,38 @@ def test_what_disturbs_it(photograph: Floats, window: tuple[Floats, ...]) -> Non
     gain = 1 + (right**2 + (1 - right) ** 2) * (down**2 + (1 - down) ** 2)
     assert found[1] == pytest.approx((unlike**2).sum() / gain / (len(unlike) - 8), rel=1e-3)
     assert found[2] == pytest.approx(np.nanmean(np.diff(picture, axis=1) ** 2) / 2, rel=1e-3)
+
+
+@pytest.mark.parametrize(("half", "enough"), [((3.9, 3.9), False), ((4.9, 4.9), True)])
+def test_few_pixels_with_an_opposite_do_not_tell_how_unlike_they_are(half: Floats, enough: bool) -> None:
+    """Then all that the model leaves stands for it."""
+    grey = photograph_of(UPRIGHT) + np.random.default_rng(3).normal(0, 0.5, (80, 80))
+    found = fit(np.rint(grey).astype(np.uint8), 255, UPRIGHT, half).found
+    assert (found[1] != found[22]) == enough
+
+
+def test_a_corner_is_not_disturbed_by_the_one_before() -> None:
+    """Whose window was larger, and brighter."""
+    photograph = np.rint(np.hstack([photograph_of(CENTRED), photograph_of(UPRIGHT)])).astype(np.uint8)
+    right = UPRIGHT + 80 * np.eye(1, PARAMETERS)[0]
+    windows = np.array([[13.0, 13.0, np.inf, np.inf], [5.3, 4.6, np.inf, np.inf]])
+
+    def both(first: int) -> tuple[Floats, Floats]:
+        p = np.array([CENTRED, right])[first:]
+        bends = np.tile(BENDS, (2, 1))[first:]
+        found = fit_corners(photograph, 90, p, bends, windows[first:], 1e-3, 60, examine=True)
+        return p[-1], found[-1]
+
+    for alone, after in zip(both(1), both(0), strict=True):
+        assert np.array_equal(alone, after)
+
+
+def test_what_is_left_is_what_the_last_step_leaves() -> None:
+    photograph = np.rint(photograph_of(CENTRED)).astype(np.uint8)
+    window, start = np.array([9.3, 8.1, np.inf, np.inf]), CENTRED + 0.25 * np.eye(2, PARAMETERS).sum(axis=0)
+    _, _, derivatives, residual = seen(photograph, start, window)
+    step = np.linalg.solve(*normal_equations(start, derivatives, residual))
+    left = residual - step @ derivatives
+    found = fit_corners(photograph, 255, start[None].copy(), BENDS[None], window[None], 1.0, 1, examine=True)[0]
+    assert found[0] == 0
+    assert found[22] == pytest.approx(left @ left / ((derivatives[5] ** 2).sum() - PARAMETERS), rel=1e-3)

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from corner_model import BENDS, CENTRED, normal_equations, photograph_of, seen
+from corner_model import BENDS, CENTRED, DIM, UPRIGHT, normal_equations, photograph_of, seen
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.corner_kernel import PARAMETERS, fit_corners
 
 HALF = np.array([9.3, 8.1, np.inf, np.inf])
-DIM = np.array([*CENTRED[:5], 30.0, 4.0, 0.03, -0.02, 0.01, -0.008])  # in which a unit too much is not lost
 CONVERGED, OUTSIDE, FAILED = 0, 1, 2
 
 
@@ -124,9 +123,6 @@ def test_grey_levels_that_still_change_have_not_been_judged(name: str) -> None:
         assert (abs(step[5]) + abs(step[6]) < 0.05 * start[6]) == (share < 0.05)
         ends[share] = after(photograph, start, tolerance=1.0)[1]
     assert ends == {0.04: CONVERGED, 0.06: FAILED}
-
-
-UPRIGHT = np.array([40.0, 40.0, 0.0, np.pi / 2, 1.0, 100.0, 60.0, 0.0, 0.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(
