@@ -34,7 +34,9 @@ def test_one_that_is_older_than_its_sources_is_not_used(tmp_path: Path, monkeypa
 
 def test_nor_is_one_that_is_too_old_to_say_of_what_it_was_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     shutil.copy(_ctypes.__file__, tmp_path / f"_native{native.SUFFIX}")  # any library
+    (tmp_path / "build_hook.py").touch()
     monkeypatch.setattr(native, "__file__", str(tmp_path / "native.py"))
+    monkeypatch.setattr(native, "SOURCES", tmp_path)
     with pytest.raises(MissingDependencyError, match="older than its sources"):
         native._library.__wrapped__()
 
