@@ -23,6 +23,7 @@ from importlib.metadata import version
 import calib_targets
 import cv2
 import numpy as np
+from _corner_subpix import by_subpix
 from _corner_views import Case, View, inside, photograph, rms, squared_over_stated
 from scipy.spatial import cKDTree
 from scipy.special import erf
@@ -39,10 +40,8 @@ def subpix(half_window: int) -> Method:
     """`cornerSubPix` from the start."""
 
     def found(view: View) -> np.ndarray:
-        grey = view.image.pixels.astype(np.float32)
-        start = view.start[inside(view.start, view.image.size, half_window + 3)].astype(np.float32)
-        until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 0.001)
-        return cv2.cornerSubPix(grey, start, (half_window, half_window), (-1, -1), until).reshape(-1, 2)
+        start = view.start[inside(view.start, view.image.size, half_window + 3)]
+        return by_subpix(view.image.pixels, start, half_window)
 
     return found
 

@@ -15,6 +15,7 @@ Run ``python validation/bench.py corners_real``, with the real photographs where
 from dataclasses import replace
 from pathlib import Path
 
+from _corner_subpix import by_subpix
 from _real_data import DATA
 
 from opencsp_calib import Board, Checkerboard, Observations, SolveOptions, detect
@@ -35,16 +36,11 @@ def rms_px(observations: Observations, solver: str = "opencv", shape: str = "fla
     return float(installed().solvers[solver].solve(observations, "opencv4", options).rms_px)
 
 
-def by_subpix(observations: Observations, folder: Path, half_window: int) -> Observations:
+def refined_by_subpix(observations: Observations, folder: Path, half_window: int) -> Observations:
     """The same corners, refined by OpenCV's way."""
-    import cv2
-
-    until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 0.001)
     views = []
     for view, file in zip(observations.views, find_images(folder), strict=True):
-        grey = read_image(file).pixels.astype("float32")
-        start = view.detection.pixels.astype("float32")
-        found = cv2.cornerSubPix(grey, start, (half_window, half_window), (-1, -1), until)
+        found = by_subpix(read_image(file).pixels, view.detection.pixels, half_window)
         views.append(replace(view, detection=replace(view.detection, pixels=found, covariance=None)))
     return replace(observations, views=tuple(views))
 
@@ -57,7 +53,9 @@ def checkerboards() -> None:
         observations = detect(DATA / name, board)
         corners = f"{sum(map(len, observations.detections))} of {len(observations.views) * len(board.points)}"
         views = f"{len(observations.used)} of {len(observations.views)}"
-        ours, *theirs = map(rms_px, (observations, *(by_subpix(observations, DATA / name, half) for half in (5, 11))))
+        ours, *theirs = map(
+            rms_px, (observations, *(refined_by_subpix(observations, DATA / name, half) for half in (5, 11)))
+        )
         print(f"| {name} | {views} | {corners} | {ours:.4f} | {asked} | {theirs[0]:.4f} | {theirs[1]:.4f} |")
     print(f"\nSandia with the board's shape free: {rms_px(observations, 'bundle', 'free'):.4f} px.")
 

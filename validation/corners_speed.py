@@ -20,6 +20,7 @@ from collections.abc import Callable
 
 import cv2
 import numpy as np
+from _corner_subpix import by_subpix
 from _corner_views import Case, View, photograph
 
 START = (
@@ -56,12 +57,7 @@ def fitting() -> None:
     view.refined()
     ours = milliseconds(view.refined, 40, time.process_time) * per_400
     grey, start = view.image.pixels.astype(np.float32), view.start.astype(np.float32)
-    until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 0.001)
-
-    def by_subpix() -> None:
-        cv2.cornerSubPix(grey, start.copy(), (11, 11), (-1, -1), until)
-
-    theirs = milliseconds(by_subpix, 20, time.process_time) * per_400
+    theirs = milliseconds(lambda: by_subpix(grey, start, 11), 20, time.process_time) * per_400
     print("| 400 corners | median ms | least ms |\n|---|---|---|")
     for name, times in (("ours", ours), ("cornerSubPix 11", theirs)):
         print(f"| {name} | {np.median(times):.1f} | {times.min():.1f} |")

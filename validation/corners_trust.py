@@ -20,7 +20,8 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from _corner_views import Case, View, photograph, rms, squared_over_stated
+from _corner_subpix import by_subpix
+from _corner_views import Case, photograph, rms, squared_over_stated
 
 from opencsp_calib import Image
 from opencsp_calib.rendering import Exposure, Scene, Spot
@@ -114,14 +115,6 @@ def honesty() -> Iterator[str]:
         yield f"| {name} | {rejected} | {np.sqrt(np.mean(square)):.4f} | {np.sqrt(np.mean(stated)):.4f} | {told} |"
 
 
-def by_subpix(view: View) -> np.ndarray:
-    """Errors of cornerSubPix with a half-window of 5 px."""
-    until = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_COUNT, 40, 0.001)
-    start = view.start.astype(np.float32)
-    found = cv2.cornerSubPix(view.image.pixels.astype(np.float32), start, (5, 5), (-1, -1), until)
-    return found.reshape(-1, 2) - view.truth
-
-
 def processed() -> Iterator[str]:
     """One photograph, as different cameras would have made it."""
     view = photograph(Case(square_px=24.0, exposure=Exposure(noise=3.0)))
@@ -130,10 +123,11 @@ def processed() -> Iterator[str]:
         made = replace(view, image=Image(name, eight_bit(process(view.image.pixels))))
         refined = made.refined()
         off = made.errors(refined)
+        by_opencv = by_subpix(made.image.pixels, made.start, 5) - made.truth
         ratio = squared_over_stated(off, refined.covariance).mean()
         worst = np.linalg.norm(off, axis=1).max()
         rejected = f"{len(refined.rejected)} of {len(view.truth)}"
-        yield f"| {name} | {rejected} | {rms(off):.4f} | {rms(by_subpix(made)):.4f} | {ratio:.2f} | {worst:.3f} |"
+        yield f"| {name} | {rejected} | {rms(off):.4f} | {rms(by_opencv):.4f} | {ratio:.2f} | {worst:.3f} |"
 
 
 def disturbances() -> Iterator[str]:
