@@ -8,7 +8,7 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.flatness import FLATNESS_LIMIT_M, Flatness, flatness_of_solved
-from opencsp_calib.report.figures import ACCENT, COLOURS, as_image, new_figure
+from opencsp_calib.report.figures import ACCENT, COLOURS, as_image, colour_bar, new_figure
 from opencsp_calib.report.html import table
 
 if TYPE_CHECKING:
@@ -40,10 +40,10 @@ def board_section(calibration: Calibration) -> str:
 
 def shape_plot(board: Board, shape: Flatness) -> "Figure":
     """Heights of the corners out of the plane, and their deviations within it."""
-    figure, (heights, arrows) = new_figure(10, 4.2, 2)
+    figure, (heights, arrows) = new_figure(10, 4.2, 2, gap=1.7)
     nominal = board.nominal_points[shape.ids] * 1e3
     shown = heights.scatter(nominal[:, 0], nominal[:, 1], c=shape.heights_m * 1e3, cmap=COLOURS, s=26, marker="s")
-    figure.colorbar(shown, ax=heights, label="height (mm)", shrink=0.8)
+    colour_bar(heights, shown, "height (mm)")
     in_plane: Floats = shape.in_plane_m * 1e3
     longest = float(np.linalg.norm(in_plane, axis=1).max()) or 1.0
     scale = longest / (board.spacing_m * 1e3)  # the longest arrow is one square long

@@ -13,10 +13,13 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ACCENT", "COLOURS", "as_image", "image_axes", "new_figure", "save_figure"]
+__all__ = ["ACCENT", "COLOURS", "as_image", "colour_bar", "image_axes", "new_figure", "save_figure"]
 
 ACCENT = "#0b6e99"
 COLOURS = "viridis"
+MARGINS = (0.6, 0.2, 0.45, 0.3)  # inches left, right, below, above for labels: an engine that fits them takes most time
+GAP = 0.7  # inches, enough for the labels of the next axes
+PADDING = 0.1  # inches
 STYLE: dict[str, Any] = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -26,14 +29,20 @@ STYLE: dict[str, Any] = {
 }
 
 
-def new_figure(width: float, height: float, columns: int = 1) -> "tuple[Figure, list[Axes]]":
-    """A figure of so many inches, with axes side by side."""
+def new_figure(width: float, height: float, columns: int = 1, *, gap: float = GAP) -> "tuple[Figure, list[Axes]]":
+    """A figure of so many inches, with axes side by side and a gap of so many inches between them."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
+    left, right, bottom, top = MARGINS
+    each = (width - left - right - (columns - 1) * gap) / columns
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        return figure, [figure.add_subplot(1, columns, index + 1) for index in range(columns)]
+        figure = Figure(figsize=(width, height))
+        grid = figure.add_gridspec(
+            1, columns, left=left / width, right=1 - right / width, bottom=bottom / height, top=1 - top / height,
+            wspace=gap / each,
+        )  # fmt: skip
+        return figure, [figure.add_subplot(grid[index]) for index in range(columns)]
 
 
 def image_axes(axes: "Axes", image_size: tuple[int, int], title: str = "") -> None:
@@ -44,6 +53,14 @@ def image_axes(axes: "Axes", image_size: tuple[int, int], title: str = "") -> No
     axes.set_ylabel("y (px)")
 
 
+def colour_bar(axes: "Axes", shown: Any, label: str = "") -> None:
+    """What the colours of something shown in axes mean, to their right."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        axes.figure.colorbar(shown, cax=axes.inset_axes((1.03, 0.1, 0.04, 0.8)), label=label)
+
+
 def as_image(figure: "Figure", alternative: str) -> str:
     """The figure as an ``img`` element, drawn as vectors."""
     import html
@@ -52,7 +69,8 @@ def as_image(figure: "Figure", alternative: str) -> str:
 
     buffer = io.BytesIO()
     with mpl.rc_context(STYLE):
-        figure.savefig(buffer, format="svg", dpi=130, bbox_inches="tight", metadata={"Date": None})
+        seen = figure.get_tightbbox().padded(PADDING)  # bbox_inches="tight" would draw it once more to learn that
+        figure.savefig(buffer, format="svg", dpi=130, bbox_inches=seen, metadata={"Date": None})
     data = base64.b64encode(buffer.getvalue()).decode()
     return f'<img class="plot" alt="{html.escape(alternative)}" src="data:image/svg+xml;base64,{data}">'
 

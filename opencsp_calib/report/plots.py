@@ -10,7 +10,7 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.comparison import Difference
 from opencsp_calib.quality import correlations, worst_views
-from opencsp_calib.report.figures import ACCENT, COLOURS, image_axes, new_figure, save_figure
+from opencsp_calib.report.figures import ACCENT, COLOURS, colour_bar, image_axes, new_figure, save_figure
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -66,7 +66,7 @@ def residual_plot(calibration: Calibration) -> "Figure":
         cmap=COLOURS,
         rasterized=True,
     )
-    figure.colorbar(arrows, ax=axes, label="residual (px)", shrink=0.8)
+    colour_bar(axes, arrows, "residual (px)")
     axes.set_title(f"predicted minus detected, {scale:.0f} times enlarged")
     return figure
 
@@ -97,7 +97,7 @@ def coverage_plot(calibration: Calibration) -> "Figure":
     x, y = np.linspace(-0.5, size[0] - 0.5, across + 1), np.linspace(-0.5, size[1] - 0.5, down + 1)
     counts, _, _ = np.histogram2d(pixels[:, 0], pixels[:, 1], bins=[x, y])
     shown = axes.pcolormesh(x, y, np.where(counts > 0, counts, np.nan).T, cmap=COLOURS)
-    figure.colorbar(shown, ax=axes, label="corners", shrink=0.8)
+    colour_bar(axes, shown, "corners")
     axes.set_facecolor("#eeeeee")
     return figure
 
@@ -143,19 +143,20 @@ def pose_plot(calibration: Calibration) -> "Figure":
     """The boards before the camera, as the camera sees them: x right, y down, z forward."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(7, 6), layout="constrained")
+    figure = Figure(figsize=(9, 8))
     axes = figure.add_subplot(projection="3d")
     columns, rows = calibration.board.grid
     corner_ids = [0, columns - 1, columns * rows - 1, columns * (rows - 1), 0]
     outline = calibration.board.points[corner_ids]
-    extent = [np.zeros((1, 3))]
-    for pose in calibration.cam_from_board:
-        x, y, z = pose.transform(outline).T
-        axes.plot(x, z, -y, color=ACCENT, linewidth=0.8)
-        axes.scatter(x[:1], z[:1], -y[:1], color="#c8553d", s=6)
-        extent.append(pose.transform(outline))
+    outlines = np.array([pose.transform(outline) for pose in calibration.cam_from_board])
+    seen = np.concatenate([np.zeros((1, 3)), outlines.reshape(-1, 3)])
+    gaps = np.full((len(outlines), 1, 3), np.nan)  # one line with gaps: an artist for each board takes long
+    x, y, z = np.concatenate([outlines, gaps], axis=1).reshape(-1, 3).T
+    axes.plot(x, z, -y, color=ACCENT, linewidth=0.8)
+    x, y, z = outlines[:, 0].T
+    axes.scatter(x, z, -y, color="#c8553d", s=6, depthshade=False)
     axes.scatter([0], [0], [0], color="black", marker="^", s=40)
-    low, high = np.concatenate(extent).min(axis=0), np.concatenate(extent).max(axis=0)
+    low, high = seen.min(axis=0), seen.max(axis=0)
     axes.set_box_aspect((max(high[0] - low[0], 1e-6), max(high[2] - low[2], 1e-6), max(high[1] - low[1], 1e-6)))
     axes.set(xlabel="x (m)", ylabel="z (m)", zlabel="-y (m)")
     return figure
@@ -173,7 +174,7 @@ def correlation_plot(calibration: Calibration) -> "Figure":
         for (row, column), value in np.ndenumerate(values):
             colour = "white" if abs(value) > 0.6 else "black"
             axes.text(column, row, f"{value:.2f}", ha="center", va="center", fontsize=7, color=colour)
-    figure.colorbar(shown, ax=axes, shrink=0.8)
+    colour_bar(axes, shown)
     return figure
 
 
@@ -185,7 +186,7 @@ def difference_plot(difference: Difference) -> "Figure":
     image_axes(axes, (round(x.max()) + 1, round(y.max()) + 1))
     if np.nanmax(lengths) > np.nanmin(lengths):
         shown = axes.contourf(x, y, lengths, levels=12, cmap=COLOURS)
-        figure.colorbar(shown, ax=axes, label="difference (px)", shrink=0.8)
+        colour_bar(axes, shown, "difference (px)")
     step = max(1, x.shape[1] // 12)
     few = (slice(None, None, step), slice(None, None, step))
     axes.quiver(

@@ -7,7 +7,7 @@ import numpy as np
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.errors import CalibError
 from opencsp_calib.projection_sigma import board_ranges, sigma_map, sigma_over_range
-from opencsp_calib.report.figures import ACCENT, COLOURS, as_image, image_axes, new_figure
+from opencsp_calib.report.figures import ACCENT, COLOURS, as_image, colour_bar, image_axes, new_figure
 from opencsp_calib.report.html import table
 from opencsp_calib.resampling import nearby_halves
 from opencsp_calib.uncertainty import Influence, influence, student_factor
@@ -71,19 +71,19 @@ def _three_estimates(calibration: Calibration) -> str:
 
 def sigma_plot(calibration: Calibration) -> "Figure":
     """Standard deviation of what the camera sees, in pixels and in milliradians, over the image."""
-    figure, panels = new_figure(10, 3.9, 2)
+    figure, panels = new_figure(10, 3.9, 2, gap=1.7)
     found = sigma_map(calibration)
     x, y = found.pixels[..., 0], found.pixels[..., 1]
     for axes, values, unit in zip(panels, (found.sigma_px, found.sigma_rad * 1e3), ("px", "mrad"), strict=True):
         image_axes(axes, calibration.camera.image_size)
         shown = axes.contourf(x, y, values, levels=12, cmap=COLOURS)
-        figure.colorbar(shown, ax=axes, label=f"one standard deviation ({unit})", shrink=0.8)
+        colour_bar(axes, shown, f"one standard deviation ({unit})")
     return figure
 
 
 def range_plot(calibration: Calibration) -> "Figure":
     """Standard deviation of projections over range; the ranges at which boards were seen are shaded."""
-    figure, panels = new_figure(10, 2.6, 2)
+    figure, panels = new_figure(10, 2.6, 2, gap=1.1)
     near, far = board_ranges(calibration)
     curve = sigma_over_range(calibration, np.geomspace(near / 3, far * 10, 60).tolist())
     for axes, values, unit in zip(panels, (curve.sigma_px, curve.sigma_rad * 1e3), ("px", "mrad"), strict=True):
