@@ -8,7 +8,7 @@ from corner_model import BENDS, CENTRED, MODEL, UPRIGHT, columns, image, normal_
 from scipy.ndimage import map_coordinates
 
 from opencsp_calib.arrays import Floats, Ids
-from opencsp_calib.corner_kernel import PARAMETERS, fit_corners
+from opencsp_calib.corner_kernel import PARAMETERS, RAMP_PX, fit_corners
 
 
 @pytest.mark.parametrize("second_edge", [0.15 + np.pi / 2, 1.3, -2.2])
@@ -24,6 +24,23 @@ def test_the_model_and_its_derivatives(second_edge: float) -> None:
         numeric = (moved[0] - moved[1]) / 2e-5
         # the smallest terms of the model are left out of its derivatives
         assert np.abs(numeric - found[k]).max() < (0.04 if k < 5 else 1e-4) * np.abs(found[k]).max()
+
+
+@pytest.mark.parametrize("blur", [0.45, 1.3])
+def test_the_model_is_exact_to_single_precision(blur: float) -> None:
+    x, y = np.random.default_rng(1).uniform(-6, 6, (2, 200))
+    p = np.array([*MODEL[:4], blur, *MODEL[5:]])
+    assert -columns(p, x, y)[-1] == pytest.approx(image(p, x, y), abs=1e-4)
+
+
+def test_how_much_a_pixel_counts() -> None:
+    """All within the window, nothing beyond it, and only near an edge where more is printed than the checkerboard."""
+    x, y = np.random.default_rng(1).uniform(-8, 8, (2, 1000))
+    window = np.array([6.3, 4.8, 3.4, 2.1])
+    along = np.abs([y * np.cos(angle) - x * np.sin(angle) for angle in MODEL[[3, 2]]] / np.sin(MODEL[3] - MODEL[2]))
+    inside = np.clip((window[:2, None] - along) / RAMP_PX + 0.5, 0, 1).prod(axis=0)
+    near = np.clip((window[2:, None] - along).max(axis=0), 0, 1)
+    assert columns(MODEL, x, y, window=window)[5] ** 2 == pytest.approx(inside * near, abs=1e-5)
 
 
 @dataclass(frozen=True)
