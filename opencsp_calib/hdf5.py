@@ -18,7 +18,6 @@ of all of it, which is looked at first (`seal`).
 """
 
 import hashlib
-import io
 import json
 import os
 from collections.abc import Iterator, Mapping
@@ -29,12 +28,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from opencsp_calib.arrays import Floats
-from opencsp_calib.atomic import check_writable, replacing
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
+from opencsp_calib.hdf5_writing import write_hdf5
 from opencsp_calib.models import OPENCV_MODELS
-from opencsp_calib.seal import check_seal, seal
+from opencsp_calib.seal import check_seal
 
 if TYPE_CHECKING:
     import h5py
@@ -49,7 +48,6 @@ __all__ = [
     "read_dataset",
     "save_camera",
     "write_camera",
-    "written",
 ]
 
 FORMAT_VERSION = 1
@@ -66,27 +64,13 @@ def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[st
     InputError
         If the file cannot be written; what was there before stays.
     """
-    with written(path) as file:
+
+    def fill(file: "h5py.File") -> None:
         write_camera(camera, file)
         if record:
             file["Calibration/record"] = json.dumps(dict(record))
 
-
-@contextmanager
-def written(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
-    """An HDF5 file to be filled, which is put in place when the block ends well.
-
-    It is made in memory, because the HDF5 library brings the process down where a disk is full.
-    """
-    import h5py
-
-    check_writable(path)
-    content = io.BytesIO()
-    with h5py.File(content, "w") as file:
-        yield file
-    with replacing(path) as temporary, temporary.open("wb") as out:
-        out.write(content.getbuffer())
-        out.write(seal(content.getbuffer()))
+    write_hdf5(path, fill)
 
 
 def load_record(path: str | os.PathLike[str]) -> dict[str, str]:

@@ -42,7 +42,8 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import FileFormatError, InputError
-from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera, written
+from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera
+from opencsp_calib.hdf5_writing import write_hdf5
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.view_json import OPTIONAL, restored_problems, restored_view, stored_problems, stored_view
@@ -63,7 +64,8 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
     InputError
         If the file cannot be written; what was there before stays.
     """
-    with written(path) as file:
+
+    def fill(file: "h5py.File") -> None:
         write_camera(calibration.camera, file)
         group = file.create_group("Calibration")
         _write_observations(calibration.observations, group.create_group("observations"))
@@ -78,6 +80,8 @@ def save_calibration(calibration: Calibration, path: str | os.PathLike[str]) -> 
         group["problems"] = json.dumps(stored_problems(calibration.problems))
         group["record"] = json.dumps(dict(calibration.record))
         group["provenance"] = json.dumps(dict(calibration.provenance))
+
+    write_hdf5(path, fill)
 
 
 def load_calibration(path: str | os.PathLike[str]) -> Calibration:
@@ -114,8 +118,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
 
 def save_observations(observations: Observations, path: str | os.PathLike[str]) -> None:
     """Write what was detected, without a camera, aside and then in place."""
-    with written(path) as file:
-        _write_observations(observations, file.create_group("Calibration/observations"))
+    write_hdf5(path, lambda file: _write_observations(observations, file.create_group("Calibration/observations")))
 
 
 def load_observations(path: str | os.PathLike[str]) -> Observations:

@@ -8,6 +8,7 @@ bytes for others without a word, and over some of them it hangs or crashes.
 import hashlib
 import os
 from pathlib import Path
+from typing import BinaryIO
 
 from opencsp_calib.errors import FileFormatError
 
@@ -19,9 +20,9 @@ LENGTH = len(MARK) + 64 + 1
 CHUNK = 2**20
 
 
-def seal(content: "bytes | memoryview") -> bytes:
-    """What to write behind the content of a file."""
-    return MARK + hashlib.sha256(content).hexdigest().encode() + b"\n"
+def seal(file: BinaryIO) -> None:
+    """Put a seal behind the content of a file that is open for reading and writing."""
+    file.write(_seal_of(file, file.seek(0, os.SEEK_END)))
 
 
 def check_seal(path: str | os.PathLike[str]) -> None:
@@ -42,13 +43,19 @@ def check_seal(path: str | os.PathLike[str]) -> None:
         found = file.read()
         if not _like_a_seal(found):
             return
-        file.seek(0)
-        digest = hashlib.sha256()
-        while left > 0 and (chunk := file.read(min(CHUNK, left))):
-            digest.update(chunk)
-            left -= len(chunk)
-    if found != MARK + digest.hexdigest().encode() + b"\n":
+        expected = _seal_of(file, left)
+    if found != expected:
         raise FileFormatError(f"{path} is damaged: its checksum does not fit its contents; take a copy of it")
+
+
+def _seal_of(file: BinaryIO, length: int) -> bytes:
+    """Of so many bytes from the beginning of a file, after which its position is then."""
+    file.seek(0)
+    digest = hashlib.sha256()
+    while length > 0 and (chunk := file.read(min(CHUNK, length))):
+        digest.update(chunk)
+        length -= len(chunk)
+    return MARK + digest.hexdigest().encode() + b"\n"
 
 
 def _like_a_seal(end: bytes) -> bool:

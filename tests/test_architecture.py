@@ -14,7 +14,7 @@ PLUGINS = CORE.parent / "plugins"
 
 TIERS = (
     "errors process_setting",
-    "arrays atomic native opencv blas processes provenance seal",
+    "arrays atomic native opencv blas processes provenance seal hdf5_writing",
     "models",
     "camera rotations convex_hull board",
     "pose",

@@ -11,7 +11,7 @@ from faults import FAULTS, NAMES, SEALED, STEPS, Kind, damaged, failing, kinds, 
 
 KINDS = {kind.name: kind for kind in kinds()}
 WRITTEN_ASIDE = [kind for kind in KINDS.values() if kind.name != "journal"]
-SEEDS, LIMITS, ROUNDS = range(80), (0, 1, 50, 120, 5000), 20
+SEEDS, LIMITS, ROUNDS = range(80), (0, 1, 50, 120, 5000, 15000), 20
 SHARED = ("camera", "opencv", "board file")
 
 

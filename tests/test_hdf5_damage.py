@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from opencsp_calib import (
 )
 from opencsp_calib.errors import CalibError, FileFormatError
 from opencsp_calib.hdf5_calibration import load_observations, save_observations
+from opencsp_calib.hdf5_writing import write_hdf5
 from opencsp_calib.seal import LENGTH
 
 
@@ -167,3 +169,26 @@ def test_every_single_byte_matters(tmp_path: Path) -> None:
         path.write_bytes(content[:place] + bytes([content[place] ^ 0x10]) + content[place + 1 :])
         with pytest.raises(FileFormatError, match="damaged"):
             load_observations(path)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no limit on the size of files")
+def test_what_a_full_disk_has_not_taken_can_be_read_while_writing(tmp_path: Path) -> None:
+    import resource
+
+    read = []
+
+    def fill(file: h5py.File) -> None:
+        for index in range(3):
+            file[f"numbers{index}"] = np.arange(1000.0) + index
+        file.flush()
+        read.extend(file[f"numbers{index}"][()] for index in range(3))
+
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (12000, before[1]))
+    try:
+        with pytest.raises(InputError, match="File too large"):
+            write_hdf5(tmp_path / "n.h5", fill)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    np.testing.assert_array_equal(read, np.arange(1000.0) + np.arange(3.0)[:, None])
+    assert list(tmp_path.iterdir()) == []
