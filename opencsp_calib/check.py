@@ -229,10 +229,9 @@ def _predicted(camera: Camera, fresh: Calibration, covariance: Matrix | None, ra
 
 def _sentence(judged: Judged) -> str:
     apart = judged.difference
-    where = "at infinity" if apart.range_m is None else f"at the board's range of {apart.range_m:.2f} m"
     return (
-        f"{where} the camera is {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} px at worst) off a fresh solution; "
-        f"uncertainty explains {judged.predicted_px:.2g} px rms: {judged.verdict}"
+        f"{apart.where} the camera is {apart.rms_px:.2g} px rms ({apart.worst_px:.2g} px at worst) off a fresh "
+        f"solution; uncertainty explains {judged.predicted_px:.2g} px rms: {judged.verdict}"
     )
 
 

@@ -65,6 +65,17 @@ class Difference:
         return np.asarray(np.linalg.norm(self.shift, axis=2), dtype=np.float64)
 
     @property
+    def where(self) -> str:
+        """For people: ``at infinity``, or at which range."""
+        return "at infinity" if self.range_m is None else f"at {self.range_m:.4g} m"
+
+    def __str__(self) -> str:
+        return (
+            f"{self.where}: rms {self.rms_px:.4g} px, median {self.median_px:.4g} px, worst {self.worst_px:.4g} px "
+            f"over the image, after a turn of the frame by {self.rotation_deg:.4g} degrees"
+        )
+
+    @property
     def missing(self) -> int:
         """At how many pixels of the grid one of the cameras has no image: they are in no figure."""
         return int(np.isnan(self.length_px).sum())

@@ -9,6 +9,8 @@ from opencsp_calib.quality import worst_views
 
 __all__ = ["drop_above", "drop_worst", "excluding"]
 
+MAX_NAMED = 8  # images in a message
+
 
 def excluding(observations: Observations, names: Iterable[str]) -> Observations:
     """Without the named images.
@@ -19,10 +21,11 @@ def excluding(observations: Observations, names: Iterable[str]) -> Observations:
         If there is no image of that name.
     """
     names = list(names)
-    known = {view.image for view in observations.views}
+    known = sorted(view.image for view in observations.views)
     for name in names:
         if name not in known:
-            raise InputError(f"there is no image {name!r} to exclude; there are {', '.join(sorted(known)[:8])} ...")
+            more = f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
+            raise InputError(f"there is no image {name!r} to exclude; there are {', '.join(known[:MAX_NAMED])}{more}")
     return observations.dropping(names, Problem("excluded", "left out because you said so"))
 
 

@@ -202,6 +202,6 @@ def _photographs(calibration: Calibration) -> set[str]:
 
 def _sentence(worst: Judged, same: bool) -> str:
     apart = worst.difference
-    where = "at infinity" if apart.range_m is None else f"at {apart.range_m:.2f} m"
-    text = f"{apart.rms_px:.2g} px rms, {apart.worst_px:.2g} px at worst {where}, where {worst.predicted_px:.2g} px are"
+    figures = f"{apart.rms_px:.2g} px rms, {apart.worst_px:.2g} px at worst {apart.where}"
+    text = f"{figures}, where {worst.predicted_px:.2g} px are"
     return f"{text} within one sigma" + ("; solved from the same photographs" if same else "")

@@ -15,7 +15,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.quality import SetQuality, ViewQuality, set_quality, view_qualities
 
-__all__ = ["REMARKS", "Verdict", "conclusion", "fold_inside", "judge", "verdict"]
+__all__ = ["FEW_VIEWS", "RANGE_SPREAD", "REMARKS", "Verdict", "conclusion", "fold_inside", "judge", "verdict"]
 
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
@@ -24,7 +24,7 @@ TILT_WANTED_DEG = (30.0, 45.0)
 FEW_VIEWS = 10
 COVERAGE_WANTED = 0.5
 ASPECT_SIGMAS, LEAST_ASPECT = 3.0, 1e-5  # of fx: less matters to nobody, and no board is as true to size
-RANGE_SPREAD = 1.1
+RANGE_SPREAD = 1.1  # farthest over nearest view
 DISQUALIFYING = ("poor-rms", "not-converged", "head-on", "parallel", "fold-inside")
 REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
 

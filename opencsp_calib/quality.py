@@ -2,16 +2,31 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix
+from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.convex_hull import convex_hull, hull_area, within_hull
 from opencsp_calib.detection import Observations
+from opencsp_calib.pose import Pose
 
-__all__ = ["SetQuality", "ViewQuality", "correlations", "coverage", "set_quality", "view_qualities", "worst_views"]
+__all__ = [
+    "Orientation",
+    "SetQuality",
+    "ViewQuality",
+    "correlations",
+    "coverage",
+    "held",
+    "range_of",
+    "set_quality",
+    "view_qualities",
+    "worst_views",
+]
+
+Orientation: TypeAlias = Literal["horizontal", "vertical"]
 
 COVERAGE_CELLS = 48  # along the longer side of the image
 
@@ -31,7 +46,7 @@ class ViewQuality:
     roll_deg : float
         Of the board's x axis in the image, -180 to 180.
     orientation : 'horizontal' or 'vertical'
-        Whether the board's longer side runs along the image's width or its height.
+        See `held`.
     range_m : float
         From the camera to the middle of the board.
     area : float
@@ -45,7 +60,7 @@ class ViewQuality:
     rms_px: float
     tilt_deg: float
     roll_deg: float
-    orientation: Literal["horizontal", "vertical"]
+    orientation: Orientation
     range_m: float
     area: float
     edge_width_px: float
@@ -76,9 +91,7 @@ class SetQuality:
 
 def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
     """What each used view is like, in order."""
-    columns, rows = calibration.board.grid
-    board_middle = calibration.board.points.mean(axis=0)
-    results = []
+    board, results = calibration.board, []
     views = zip(
         calibration.observations.used,
         calibration.cam_from_board,
@@ -88,7 +101,6 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
     )
     for view, pose, outliers, rms in views:
         matrix = pose.matrix
-        longer = matrix[:, 0] if columns >= rows else matrix[:, 1]
         widths = view.detection.edge_width_px
         results.append(
             ViewQuality(
@@ -97,13 +109,25 @@ def view_qualities(calibration: Calibration) -> tuple[ViewQuality, ...]:
                 rms_px=float(rms),
                 tilt_deg=pose.tilt_deg,
                 roll_deg=float(np.degrees(np.arctan2(matrix[1, 0], matrix[0, 0]))),
-                orientation="horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical",
-                range_m=float(np.linalg.norm(pose.transform(board_middle[None])[0])),
+                orientation=held(board, pose),
+                range_m=range_of(board, pose),
                 area=hull_area(convex_hull(view.detection.pixels)) / np.prod(calibration.camera.image_size),
                 edge_width_px=float("nan") if widths is None else float(np.median(widths)),
             )
         )
     return tuple(results)
+
+
+def held(board: Board, pose: Pose) -> Orientation:
+    """How the board's longer side runs: ``horizontal``, along the image's width, or ``vertical``, along its height."""
+    columns, rows = board.grid
+    longer = pose.matrix[:, 0] if columns >= rows else pose.matrix[:, 1]
+    return "horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical"
+
+
+def range_of(board: Board, pose: Pose) -> float:
+    """From the camera to the middle of the board, metres."""
+    return float(np.linalg.norm(pose.transform(board.points.mean(axis=0)[None])[0]))
 
 
 def worst_views(calibration: Calibration, count: int = 5) -> tuple[int, ...]:

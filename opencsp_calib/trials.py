@@ -144,7 +144,6 @@ def try_out(
         return solver.solve(views, model, options)
 
     whole = solve_with_aspect(observations, options, run, aspect_given=aspect_given)
-
     shaped = whole.options.board_shape == "free"
     guess = whole.camera if "guess" in solver.abilities else None
 

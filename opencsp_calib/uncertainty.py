@@ -28,6 +28,7 @@ from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
+from opencsp_calib.quality import range_of
 from opencsp_calib.schur import factorise
 
 __all__ = [
@@ -205,5 +206,4 @@ def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...], jacob
 def _place(calibration: Calibration, image: str) -> str:
     index = [view.image for view in calibration.observations.used].index(image)
     pose = calibration.cam_from_board[index]
-    distance = np.linalg.norm(pose.transform(calibration.board.points.mean(axis=0)[None])[0])
-    return f"with the board {distance:.2f} m away and tilted by {pose.tilt_deg:.0f} degrees"
+    return f"with the board {range_of(calibration.board, pose):.2f} m away and tilted by {pose.tilt_deg:.0f} degrees"

@@ -75,12 +75,7 @@ def compare(
         camera_in(file, name, image_size, where_several=once is not None) for file, name in ((a, of_a), (b, of_b))
     )
     difference = compared(left, right, range_m=range_m)
-    where = "at infinity" if range_m is None else f"at {range_m:g} m"
-    say(
-        f"{where}: rms {difference.rms_px:.4g} px, median {difference.median_px:.4g} px, "
-        f"worst {difference.worst_px:.4g} px over the image, "
-        f"after a turn of the frame by {difference.rotation_deg:.4g} degrees"
-    )
+    say(str(difference))
     if plot:
         from opencsp_calib.report import plot_difference
 

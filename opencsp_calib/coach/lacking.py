@@ -10,15 +10,15 @@ from opencsp_calib.arrays import Pixels
 from opencsp_calib.board import Board
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations
+from opencsp_calib.judgement import FEW_VIEWS, RANGE_SPREAD
 from opencsp_calib.pose import Pose
+from opencsp_calib.quality import held, range_of
 
-__all__ = ["FEW_VIEWS", "REGIONS", "TILT_ALLOWED_DEG", "Lack", "held", "lacks", "range_of"]
+__all__ = ["REGIONS", "TILT_ALLOWED_DEG", "Lack", "lacks"]
 
-FEW_VIEWS = 10
 TILT_ALLOWED_DEG = (25.0, 50.0)  # 30 to 45 are asked for; a person does not hold a board to a degree
 REACH = 0.2  # of the image's width and height: corners of the board this near to an edge reach it
 LEAST_OF_EACH = 0.3  # of the views, held each way; the procedure asks for half
-RANGE_SPREAD = 1.1
 NEAR_FAR = 1.15  # times the middle range: a view this much nearer or farther spreads them
 
 REGIONS = {
@@ -59,18 +59,6 @@ def lacks(observations: Observations, poses: Sequence[Pose]) -> tuple[Lack, ...]
         _range(board, poses),
     ]
     return tuple(lack for lack in found if lack is not None)
-
-
-def held(board: Board, pose: Pose) -> str:
-    """``horizontal`` or ``vertical``: how the board's longer side runs in the image."""
-    columns, rows = board.grid
-    longer = pose.matrix[:, 0] if columns >= rows else pose.matrix[:, 1]
-    return "horizontal" if abs(longer[0]) >= abs(longer[1]) else "vertical"
-
-
-def range_of(board: Board, pose: Pose) -> float:
-    """From the camera to the middle of the board, metres."""
-    return float(np.linalg.norm(pose.transform(board.points.mean(axis=0)[None])[0]))
 
 
 def _views(count: int) -> Lack | None:

@@ -7,11 +7,12 @@ from typing import Literal
 import numpy as np
 
 from opencsp_calib.coach.knowledge import Knowledge
-from opencsp_calib.coach.lacking import TILT_ALLOWED_DEG, held, range_of
+from opencsp_calib.coach.lacking import TILT_ALLOWED_DEG
 from opencsp_calib.coach.preview import Glance
 from opencsp_calib.coach.wording import tilted_side
 from opencsp_calib.detection import Detection
 from opencsp_calib.pose import Pose
+from opencsp_calib.quality import held, range_of
 
 __all__ = ["Gauge", "Moment", "judge_moment"]
 

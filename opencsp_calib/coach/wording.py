@@ -7,8 +7,9 @@ import numpy as np
 from opencsp_calib.arrays import Pixels
 from opencsp_calib.board import Board
 from opencsp_calib.camera import Camera
-from opencsp_calib.coach.lacking import REGIONS, held, range_of
+from opencsp_calib.coach.lacking import REGIONS
 from opencsp_calib.pose import Pose
+from opencsp_calib.quality import held, range_of
 from opencsp_calib.synthetic import outline
 
 __all__ = ["described", "sketch", "tilted_side"]

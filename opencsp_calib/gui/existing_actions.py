@@ -88,12 +88,7 @@ def _compare(page: "Page", chosen: Chosen) -> Refresh:
         from opencsp_calib.report.plots import difference_plot
 
         found = compare(chosen.opened.camera, other_camera, range_m=range_m)
-        where = "at infinity" if range_m is None else f"at {range_m:g} m"
-        sentence = (
-            f"{where}: rms {found.rms_px:.4g} px, median {found.median_px:.4g} px, worst {found.worst_px:.4g} px over "
-            f"the image, after a turn of the frame by {found.rotation_deg:.4g} degrees"
-        )
-        return f"<h2>Compared</h2><p>{escape(sentence)}</p>" + as_image(difference_plot(found), sentence)
+        return f"<h2>Compared</h2><p>{escape(str(found))}</p>" + as_image(difference_plot(found), str(found))
 
     async def run() -> None:
         try:

@@ -182,7 +182,7 @@ def difference_plot(difference: Difference) -> "Figure":
     """How far apart two cameras see, over the image, once their frames are aligned."""
     figure, (axes,) = new_figure(6.5, 4.8)
     x, y = difference.pixels[..., 0], difference.pixels[..., 1]
-    lengths = np.linalg.norm(difference.shift, axis=2)
+    lengths = difference.length_px
     image_axes(axes, (round(x.max()) + 1, round(y.max()) + 1))
     if np.nanmax(lengths) > np.nanmin(lengths):
         shown = axes.contourf(x, y, lengths, levels=12, cmap=COLOURS)
@@ -192,8 +192,7 @@ def difference_plot(difference: Difference) -> "Figure":
     axes.quiver(
         x[few], y[few], difference.shift[few][..., 0], difference.shift[few][..., 1], angles="xy", color="white"
     )
-    where = "at infinity" if difference.range_m is None else f"at {difference.range_m:g} m"
-    axes.set_title(f"{where}: rms {difference.rms_px:.3g} px, worst {difference.worst_px:.3g} px")
+    axes.set_title(f"{difference.where}: rms {difference.rms_px:.3g} px, worst {difference.worst_px:.3g} px")
     return figure
 
 
