@@ -83,6 +83,7 @@ def residual_histogram(calibration: Calibration) -> "Figure":
             len(values) * (edges[1] - edges[0]) / (sigma * np.sqrt(2 * np.pi)) * np.exp(-0.5 * (edges / sigma) ** 2)
         )
         axes.plot(edges, expected, color="black", linewidth=0.8)
+        axes.locator_params(axis="x", nbins=6)  # more run into each other
         axes.set_xlabel(f"residual in {name} (px), standard deviation {sigma:.4f}")
     return figure
 
