@@ -74,9 +74,9 @@ def test_a_board_is_drawn(suffix: str, tmp_path: Path) -> None:
 
 
 def test_plugins_and_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    names = {(entry["kind"], entry["name"]) for entry in answer(capsys, "plugins")}
+    names = {(entry["kind"], entry["name"]) for entry in answer(capsys, "plugins")["plugins"]}
     assert {("solver", "bundle"), ("detector", "checkerboard"), ("board", "charuco")} <= names
-    assert {"opencsp", "colmap"} & {entry["name"] for entry in answer(capsys, "formats")}
+    assert {"opencsp", "colmap"} & {entry["name"] for entry in answer(capsys, "formats")["formats"]}
 
 
 def test_convert_takes_typed_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
