@@ -17,7 +17,7 @@ def write_document(title: str, sections: Iterable[str], path: str | os.PathLike[
     ----------
     title : str
     sections : iterable of str
-        HTML; empty ones are passed over.
+        HTML; empty ones are passed over. Each is written before the next one is asked for: photographs take memory.
     path : path-like
 
     Raises
@@ -26,12 +26,12 @@ def write_document(title: str, sections: Iterable[str], path: str | os.PathLike[
         If it cannot be written.
     """
     style = files("opencsp_calib.report").joinpath("style.css").read_text(encoding="utf-8")
-    page = (
+    head = (
         '<!doctype html><html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escape(title)}</title><style>{style}</style></head><body>\n"
-        + "\n".join(section for section in sections if section)
-        + "\n</body></html>\n"
     )
-    with replacing(path) as temporary:
-        temporary.write_text(page, encoding="utf-8", errors="backslashreplace")
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", errors="backslashreplace") as page:
+        page.write(head)
+        page.writelines(f"{section}\n" for section in sections if section)
+        page.write("</body></html>\n")

@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Iterator
 from html import escape
 
 import numpy as np
@@ -38,20 +39,24 @@ def write_report(calibration: Calibration, path: str | os.PathLike[str], *, befo
     InputError
         If it cannot be written.
     """
-    sections = (
-        summary(calibration),
-        changes(calibration, before),
-        parameters(calibration),
-        _views_in_order(calibration),
-        residuals(calibration),
-        _coverage_and_poses(calibration),
-        distortion(calibration),
-        board_section(calibration),
-        trust_section(calibration),
-        _photographs(calibration),
-        _provenance(calibration),
-    )
-    write_document(f"Calibration of {calibration.camera.name}", sections, path)
+    write_document(f"Calibration of {calibration.camera.name}", _sections(calibration, before), path)
+
+
+def _sections(calibration: Calibration, before: Calibration | None) -> Iterator[str]:
+    """One after the other, each when it is asked for."""
+    yield summary(calibration)
+    yield changes(calibration, before)
+    yield parameters(calibration)
+    yield _views_in_order(calibration)
+    yield residuals(calibration)
+    yield _coverage_and_poses(calibration)
+    yield distortion(calibration)
+    yield board_section(calibration)
+    yield trust_section(calibration)
+    yield '<h2>Photographs</h2><div class="views">'
+    yield from photographs(calibration)
+    yield "</div>"
+    yield _provenance(calibration)
 
 
 def summary(calibration: Calibration) -> str:
@@ -167,10 +172,6 @@ def distortion(calibration: Calibration) -> str:
         + as_image(plots.distortion_plot(calibration.camera), "radial, tangential and total distortion")
         + as_image(plots.distortion_size_plot(calibration.camera), "size of the distortion")
     )
-
-
-def _photographs(calibration: Calibration) -> str:
-    return f'<h2>Photographs</h2><div class="views">{"".join(photographs(calibration))}</div>'
 
 
 def _provenance(calibration: Calibration) -> str:

@@ -2,7 +2,7 @@
 
 import base64
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
 from pathlib import Path
@@ -19,25 +19,26 @@ from opencsp_calib.images import ImageFile, encode_thumbnail, read_image
 __all__ = ["photographs"]
 
 THUMBNAIL_PX = 480
+TOGETHER = 64  # views, whose photographs are read at the same time as cores allow
 
 
-def photographs(calibration: Calibration) -> list[str]:
-    """One ``figure`` element for each image looked at, in order; used or not.
+def photographs(calibration: Calibration) -> Iterator[str]:
+    """One ``figure`` element for each image looked at, in order; used or not. A few are made ahead, never all at once.
 
     The images are read again from where they were, if they are still there and unchanged; without them the corners
     are drawn on an empty frame.
     """
     views = calibration.observations.views
     places: Mapping[str, str] = calibration.provenance.get("images", {})
-    with ThreadPoolExecutor() as pool:
-        thumbnails = list(pool.map(lambda view: _thumbnail(view, places.get(view.image)), views))
     used = [view.image for view in calibration.observations.used]
     residuals = dict(zip(used, calibration.residuals, strict=True))
     enlarged = 0.02 * calibration.camera.image_size[0] / max(calibration.rms_px, 1e-9)
-    return [
-        _figure(view, thumbnail, calibration, residuals.get(view.image), enlarged)
-        for view, thumbnail in zip(views, thumbnails, strict=True)
-    ]
+    with ThreadPoolExecutor() as pool:
+        for first in range(0, len(views), TOGETHER):
+            some = views[first : first + TOGETHER]
+            thumbnails = pool.map(lambda view: _thumbnail(view, places.get(view.image)), some)
+            for view, thumbnail in zip(some, thumbnails, strict=True):
+                yield _figure(view, thumbnail, calibration, residuals.get(view.image), enlarged)
 
 
 def _thumbnail(view: View, place: str | None) -> str:

@@ -29,6 +29,7 @@ __all__ = [
 ]
 
 ARROWS_ACROSS = 12  # along the short side, as the seed draws them
+MOST_ARROWS = 20_000  # of residuals: of more none could be told from the others, and matplotlib takes 1 kB for each
 RADIAL = ("k1", "k2", "k3", "k4", "k5", "k6")
 
 
@@ -48,9 +49,13 @@ def rms_plot(calibration: Calibration) -> "Figure":
 
 
 def residual_plot(calibration: Calibration) -> "Figure":
-    """Residuals of all corners over the image; arrows enlarged so that the rms is 1 % of the image's width."""
+    """Residuals over the image, of at most `MOST_ARROWS` corners; enlarged so that their rms is 1 % of its width."""
     figure, (axes,) = new_figure(8, 6)
     pixels, residuals = _pixels_and_residuals(calibration)
+    corners = len(pixels)
+    if corners > MOST_ARROWS:  # drawn at random, but always the same ones
+        some = np.sort(np.random.default_rng(corners).permutation(corners)[:MOST_ARROWS])
+        pixels, residuals = pixels[some], residuals[some]
     size = calibration.camera.image_size
     image_axes(axes, size)
     scale = 0.01 * size[0] / calibration.rms_px if calibration.rms_px > 0 else 1.0
@@ -67,7 +72,8 @@ def residual_plot(calibration: Calibration) -> "Figure":
         rasterized=True,
     )
     colour_bar(axes, arrows, "residual (px)")
-    axes.set_title(f"predicted minus detected, {scale:.0f} times enlarged")
+    drawn = f"; {len(pixels)} of {corners} corners" if len(pixels) < corners else ""
+    axes.set_title(f"predicted minus detected, {scale:.0f} times enlarged{drawn}")
     return figure
 
 
