@@ -60,7 +60,10 @@ PARTS = (
     Part(
         "corners in C",
         ("../native/corner_*.c",),
-        ("test_native", "test_corner_kernel", "test_corners_rejected", "test_corners", "test_corners_processed"),
+        (
+            *("test_native", "test_corner_kernel", "test_corner_steps"),
+            *("test_corners_rejected", "test_corners", "test_corners_processed"),
+        ),
     ),
     Part("hdf5", ("hdf5*.py",), ("test_hdf5", "test_hdf5_damage")),
     Part("comparison", ("comparison.py",), ("test_comparison",)),
