@@ -10,7 +10,7 @@ from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.normal_equations import NormalEquations, normal_equations
 from opencsp_calib.schur import Factorisation, factorise
 
-__all__ = ["CONVERGED_SIGMAS", "LEAST_SIGMA_PX", "OPEN_CENTRE", "OPEN_FOCAL", "judged", "remaining_sigmas"]
+__all__ = ["CONVERGED_SIGMAS", "LEAST_SIGMA_PX", "OPEN_CENTRE", "OPEN_FOCAL", "determined", "remaining_sigmas"]
 
 CONVERGED_SIGMAS = 0.1  # pixels rounded to single precision, which some engines take, leave some 0.01
 SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this
@@ -19,7 +19,7 @@ OPEN_FOCAL = 0.05  # sigma of a focal length over the focal length, above which 
 OPEN_CENTRE = 0.2  # sigma of the principal point over the image's longer side, likewise
 
 
-def judged(calibration: Calibration) -> Calibration:
+def determined(calibration: Calibration) -> Calibration:
     """A solution that its observations determine, with a Problem ``not-converged`` where the engine stopped short.
 
     With a warp, whose unknowns are each solver's own, the board is taken as solved; by how far the engine stopped

@@ -7,7 +7,7 @@ import pytest
 from solver_worlds import SEED_BOARD, seed_world
 
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.convergence import judged, remaining_sigmas
+from opencsp_calib.convergence import determined, remaining_sigmas
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibrationFailedError, InputError
@@ -136,12 +136,12 @@ def test_remaining_sigmas_are_infinite_where_nothing_is_determined():
     calibration = Calibration(pinhole, seen, head_on, SEED_BOARD, "", SolveOptions())
     assert remaining_sigmas(calibration) > 1e3  # to rounding
     with pytest.raises(CalibrationFailedError, match="4 views do not determine the"):
-        judged(calibration)
+        determined(calibration)
 
 
 def test_a_solution_that_stops_short_is_said_to():
-    assert judged(exact(CAMERA.params)).problems == ()
-    short = judged(exact(CAMERA.params + np.eye(8)[0] * 0.3))
+    assert determined(exact(CAMERA.params)).problems == ()
+    short = determined(exact(CAMERA.params + np.eye(8)[0] * 0.3))
     assert [problem.code for problem in short.problems] == ["not-converged"]
 
 

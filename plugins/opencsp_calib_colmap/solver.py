@@ -10,7 +10,7 @@ import numpy as np
 
 from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, Points
-from opencsp_calib.convergence import judged
+from opencsp_calib.convergence import determined
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.free_board import laid_on_given, with_lone_corners
 from opencsp_calib.initial import initial_camera, initial_poses
@@ -75,7 +75,7 @@ class ColmapSolver:
         vectors = rotation_vectors(rotations)
         calibration = finished(self, observations, model, options, params, vectors, translations, board=board)
         _check_in_front(calibration)
-        return judged(calibration)
+        return determined(calibration)
 
 
 def _scene(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from opencsp_calib import Board, Calibration, CalibrationFailedError, InputError, Observations, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, checked
-from opencsp_calib.convergence import judged
+from opencsp_calib.convergence import determined
 from opencsp_calib.free_board import laid_on_given
 from opencsp_calib.initial import initial_camera, initial_poses
 from opencsp_calib.models import lens_model
@@ -107,7 +107,7 @@ class MrcalSolver:
         if options.robust:
             weights = _answer(solution, "weights", (views, rows, columns)).reshape(views, -1)
             outliers = [w[d.ids] < 0 for w, d in zip(weights, observations.detections, strict=True)]
-        return judged(
+        return determined(
             finished(
                 self, observations, model, options, params, rotations, translations, board=board, outliers=outliers
             )

@@ -9,7 +9,7 @@ import numpy as np
 
 from opencsp_calib import CalibrationFailedError, InputError, Observations, SolveOptions
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.convergence import judged
+from opencsp_calib.convergence import determined
 from opencsp_calib.initial import initial_camera
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.opencv import opencv_on_one_thread
@@ -54,7 +54,7 @@ class OpenCVSolver:
         with opencv_on_one_thread():  # with more, OpenCV's sums, and so its results, differ from run to run
             params, rotations, translations = engine(observations, model, options)
         translations = translations * observations.board.spacing_m
-        return judged(finished(self, observations, model, options, params, rotations, translations))
+        return determined(finished(self, observations, model, options, params, rotations, translations))
 
 
 def _solve_pinhole(observations: Observations, model: str, options: SolveOptions) -> Solution:
