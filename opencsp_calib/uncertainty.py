@@ -7,7 +7,8 @@ Two estimates, for any solver's result, from the normal equations at its solutio
 *jackknife*  how the camera moves when each view in turn is left out, ``(V - 1)/V sum (d - mean)(d - mean)'``: a view
              may be wrong as a whole, in any way. It has about V - 1 degrees of freedom: 95 % of the truth lies within
              Student's t of that many, times sigma (`student_factor`). In the literature of clustered errors this is
-             CV3 (Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023).
+             CV3 (Bell and McCaffrey 2002; MacKinnon, Nielsen and Webb 2023). Where views are few and of unequal
+             weight it takes another number of sigmas than Student's t: `opencsp_calib.leverage` makes up for that.
 
 The honest one, which is shown, saved and used in verdicts, is the jackknife. Only where it is below the residual one on
 the whole, in the mean of all directions of parameter space, what it lacks is added as a part of that: few views, or
@@ -26,10 +27,11 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.leaving_out import camera_without_each_view
+from opencsp_calib.leverage import jackknife_correction
 from opencsp_calib.normal_equations import normal_equations
 from opencsp_calib.projection_sigma import Alignment, projection_sigma, ray_sigma, sigma_map, sigma_over_range
 from opencsp_calib.quality import range_of
-from opencsp_calib.schur import factorise
+from opencsp_calib.schur import Factorisation, factorise
 
 __all__ = [
     "Influence",
@@ -89,7 +91,7 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     if np.isfinite(calibration.covariance).all() or {p.code for p in calibration.problems} & UNKNOWN:
         return calibration
     try:
-        residual, steps, basis = _linearised(calibration)
+        residual, steps, factor = _linearised(calibration)
     except np.linalg.LinAlgError as error:
         message = f"the views do not determine the camera ({error}): take more of them, from different directions"
         return calibration.with_problems(Problem("undetermined", message))
@@ -97,21 +99,22 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     unknown = _why_unknown(calibration, steps)
     if unknown:
         return calibration.with_problems(unknown)
-    honest = honest_covariance(residual, jackknife_covariance(steps), basis)
+    jackknife = jackknife_correction(factor) ** 2 * jackknife_covariance(steps)
+    honest = honest_covariance(residual, jackknife, factor.equations.unknowns.camera)
     calibration = replace(calibration, covariance=honest)
     jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
     hangs = _hangs_on(calibration, _influence(calibration, steps, jacobian), jacobian)
     return calibration.with_problems(*hangs)
 
 
-def _linearised(calibration: Calibration) -> tuple[Matrix, Floats, Matrix]:
-    """Covariance by the residuals (P, P), steps without each view (V, P), and what the parameters may do (P, Q)."""
+def _linearised(calibration: Calibration) -> tuple[Matrix, Floats, Factorisation]:
+    """Covariance by the residuals (P, P), steps without each view (V, P), and what both are from."""
     equations = normal_equations(calibration)
     if equations.dof <= 0:
         raise np.linalg.LinAlgError("no more observations than unknowns")
     factor = factorise(equations)
     residual = factor.camera_covariance * max(equations.cost / equations.dof, ROUNDING**2)
-    return residual, camera_without_each_view(factor), equations.unknowns.camera
+    return residual, camera_without_each_view(factor), factor
 
 
 def influence(calibration: Calibration) -> tuple[Influence, ...]:

@@ -9,7 +9,7 @@ from opencsp_calib.board import Checkerboard
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.corner_table import CornerTable
-from opencsp_calib.detection import Observations
+from opencsp_calib.detection import Detection, Observations
 from opencsp_calib.normal_equations import NormalEquations, linearise, normal_equations
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
@@ -93,6 +93,15 @@ class Dense:
 
     def gradient(self, equations: NormalEquations) -> np.ndarray:
         return np.concatenate([part.ravel() for part in equations.gradient])
+
+
+def without_view(equations: NormalEquations, view: int) -> NormalEquations:
+    """Those of all other views, linearised at the same place."""
+    table, estimate = equations.table, equations.estimate
+    rest = np.flatnonzero(np.arange(len(equations.pose)) != view)
+    part = Estimate(estimate.params, estimate.rotations[rest], estimate.translations[rest], estimate.points)
+    seen = [Detection(table.ids[s], table.pixels[s]) for v in rest for s in [table.span(v, v + 1)]]
+    return linearise(equations.lens, CornerTable.of(seen), part, equations.unknowns)
 
 
 def scaled_pinv(matrix: np.ndarray) -> np.ndarray:

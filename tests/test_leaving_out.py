@@ -4,15 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from dense_equations import SHAPES, Dense, at_minimum, scaled_pinv, world
+from dense_equations import SHAPES, Dense, at_minimum, scaled_pinv, without_view, world
 
-from opencsp_calib.corner_table import CornerTable
-from opencsp_calib.detection import Detection
 from opencsp_calib.leaving_out import camera_without_each_view
 from opencsp_calib.normal_equations import linearise
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.schur import factorise
-from opencsp_calib.unknowns import Estimate
 
 
 @pytest.mark.parametrize(("shape", "aspect"), SHAPES)
@@ -23,11 +20,7 @@ def test_leaving_out_a_view_is_the_newton_step_without_it(shape, aspect):
     sigma = np.sqrt(np.diag(factorise(equations).camera_covariance))
     found = camera_without_each_view(factorise(equations))
     for view, step in enumerate(found):
-        rest = np.arange(len(found)) != view
-        table, estimate = equations.table, equations.estimate
-        part = Estimate(estimate.params, estimate.rotations[rest], estimate.translations[rest], estimate.points)
-        seen = [Detection(table.ids[s], table.pixels[s]) for v in np.flatnonzero(rest) for s in [table.span(v, v + 1)]]
-        without = linearise(equations.lens, CornerTable.of(seen), part, equations.unknowns)
+        without = without_view(equations, view)
         expected = basis @ (-scaled_pinv(dense.matrix(without)) @ dense.gradient(without))[: basis.shape[1]]
         assert np.abs((step - expected) / sigma).max() < 1e-5
 
