@@ -173,9 +173,9 @@ class CornerTable:
 
 def _typical_variance(detections: Sequence[Detection]) -> float:
     """Px² the median over corners and axes; 1 where no corner has a usable covariance."""
-    known = [d.covariance[_usable(d.covariance)] for d in detections if d.covariance is not None]
-    diagonals = np.concatenate([np.empty((0, 2)), *(covariances[:, [0, 1], [0, 1]] for covariances in known)])
-    return float(np.median(diagonals)) if len(diagonals) else 1.0
+    known = [d.covariance[:, [0, 1], [0, 1]][_usable(d.covariance)] for d in detections if d.covariance is not None]
+    diagonals = np.concatenate([np.empty((0, 2)), *known])
+    return float(np.median(diagonals, overwrite_input=True)) if len(diagonals) else 1.0
 
 
 def _usable(covariances: Covariances) -> Mask:

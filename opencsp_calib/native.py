@@ -44,12 +44,23 @@ def native_function(name: str, *arguments: Any) -> Callable[..., None]:
 
 def array_of(dtype: type[np.generic], dimensions: int) -> Any:
     """An array that is read: its numbers lie one after another, the last axis fastest."""
-    return np.ctypeslib.ndpointer(dtype, dimensions, flags="C_CONTIGUOUS")
+    return _address_of(np.ctypeslib.ndpointer(dtype, dimensions, flags="C_CONTIGUOUS"))
 
 
 def result_of(dtype: type[np.generic], dimensions: int) -> Any:
     """An array that is written to, in the same order."""
-    return np.ctypeslib.ndpointer(dtype, dimensions, flags=("C_CONTIGUOUS", "WRITEABLE"))
+    return _address_of(np.ctypeslib.ndpointer(dtype, dimensions, flags=("C_CONTIGUOUS", "WRITEABLE")))
+
+
+def _address_of(kind: Any) -> Any:
+    """What NumPy makes of an argument refers to itself: megabytes of it would await Python's search for cycles."""
+
+    class Address(kind):  # type: ignore[misc]  # made when the program runs
+        @classmethod
+        def from_param(cls, array: Any) -> ctypes.c_void_p:
+            return ctypes.c_void_p(super().from_param(array).data)
+
+    return Address
 
 
 @cache
