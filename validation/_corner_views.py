@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Camera, Checkerboard, Detection, Image, Pose
 from opencsp_calib.corners import refine
 from opencsp_calib.rendering import Exposure, Scene, render
+from opencsp_calib.synthetic import turned
 
 SIZE = (1626, 1236)
 SPACING_M = 0.05
@@ -71,13 +71,12 @@ def photograph(case: Case) -> View:
     columns, rows = (int(0.85 * side / case.square_px - 1) for side in SIZE)
     board = Checkerboard(min(columns, MOST_SQUARES[0] - 1), min(rows, MOST_SQUARES[1] - 1), SPACING_M)
     azimuth, roll = rng.uniform(-np.pi, np.pi), rng.uniform(-0.47, 0.47)
-    tilt = Rotation.from_rotvec(np.radians(case.tilt_deg) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0]))
-    turn = tilt * Rotation.from_rotvec([0.0, 0.0, roll])
+    turn = turned(np.radians(case.tilt_deg), azimuth, roll)
     ray = np.array([*rng.uniform(-0.5, 0.5, 2) / focal, 1.0])
-    translation = focal * SPACING_M / case.square_px * ray - turn.apply(board.points.mean(axis=0))
+    translation = focal * SPACING_M / case.square_px * ray - turn @ board.points.mean(axis=0)
     params = [focal, focal, SIZE[0] / 2 + 7.8, SIZE[1] / 2 - 5.7, -0.22, 0.15, 6e-4, -4e-4]
     camera = Camera("study", "opencv4", params, SIZE)
-    pose = Pose(turn.as_rotvec(), translation)
+    pose = Pose.from_matrix(turn, translation)
     image = _exposed(camera, board, pose, case)
     rotation, translation = np.array(pose.rotation), np.array(pose.translation)
     truth = cv2.projectPoints(board.points, rotation, translation, camera.matrix, np.array(camera.distortion))[0]

@@ -31,11 +31,11 @@ def head_of(study: Path) -> str:
     text = re.match(r'"""(.*?)"""', study.read_text(encoding="utf-8"), re.DOTALL)[1]
     title = text.partition("\n")[0].rstrip(".")
     parts = [f"# {title}", *(f"**{word}.** {_section(text, word)}" for word in ("Claim", "Way"))]
-    return "\n\n".join([*parts, f"**Run.** `python validation/{study.name}`"]) + "\n\n"
+    return "\n\n".join([*parts, f"**Run.** `python validation/bench.py {study.stem}`"]) + "\n\n"
 
 
 def _section(text: str, word: str) -> str:
-    found = re.search(rf"^{word}s?(?::|\n)(.*?)(?=\n\n|\Z)", text, re.DOTALL | re.MULTILINE)
+    found = re.search(rf"^{word}s?\n(.*?)(?=\n\n|\Z)", text, re.DOTALL | re.MULTILINE)
     if not found:
         raise ValueError(f"the docstring has no {word!r}: {text[:60]!r}")
     return "\n".join(line.strip() for line in found[1].strip().splitlines())

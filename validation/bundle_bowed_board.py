@@ -10,22 +10,21 @@ Way
     and noise. "Seed's way" is OpenCV's solver on the corners of the same photographs with OpenCV's sub-pixel search.
     Shape: distance of solved corners from true ones after a similarity, rms.
 
-Run ``python validation/bundle_bowed_board.py``.
+Run ``python validation/bench.py bundle_bowed_board``.
 """
 
 import tempfile
 from pathlib import Path
 
 import numpy as np
+from _photographs import write_photographs
 from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Calibration, Checkerboard, SolveOptions, detect
 from opencsp_calib.arrays import Points
 from opencsp_calib.comparison import compare
 from opencsp_calib.detection import Observations
-from opencsp_calib.images import write_image
 from opencsp_calib.registry import installed
-from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import bowed, demo_camera, seed_poses
 from opencsp_calib.uncertainty import with_uncertainty
 
@@ -45,10 +44,7 @@ WAYS = {
 
 def photographs(folder: Path, bow_m: float, seed: int) -> None:
     """The world's photographs, as files."""
-    truth = bowed(BOARD, bow_m)
-    for index, pose in enumerate(seed_poses(BOARD, CAMERA, VIEWS, seed)):
-        image = render(CAMERA, truth, pose, rng=1000 * seed + index, name=f"{index:03}")
-        write_image(image.pixels, folder / f"{index:03}.png")
+    write_photographs(folder, CAMERA, bowed(BOARD, bow_m), seed_poses(BOARD, CAMERA, VIEWS, seed), 1000 * seed)
 
 
 def shape_error_mm(solved: Points, truth: Points) -> float:

@@ -12,7 +12,7 @@ Way
     residuals', so that it is the Cramér-Rao bound; "cost" is errors free over flat, and its bound likewise.
     Projections: over the image (40 x 30 points), after the change of frame that fits best, rms over points.
 
-Run ``python validation/bundle_flat_board.py``.
+Run ``python validation/bench.py bundle_flat_board``.
 """
 
 import sys

@@ -9,7 +9,7 @@ Way
     `Solver.solve`, start, checks and covariance included, and of ``cv2.calibrateCamera`` alone, in turn; the quickest
     of five of each, and the median of the five ratios. Other work on the machine makes both slower, not their ratio.
 
-Run ``python validation/bundle_speed.py``.
+Run ``python validation/bench.py bundle_speed``.
 """
 
 import time

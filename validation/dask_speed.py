@@ -1,42 +1,31 @@
 """Two Dask workers against one, and against threads on this machine.
 
-Claim: with a core each, two workers look at images at least 1.7 times as fast as one; the result is the same to the
-last bit.
+Claim
+    With a core each, two workers look at images at least 1.7 times as fast as one; the result is the same to the last
+    bit.
 
-Way: rendered photographs of 1626 x 1236 pixels; a scheduler and workers of one thread each on loopback; each worker
-has looked at a few images before the clock starts. Wall time, so run it on a machine with nothing else to do; the
-client and the scheduler take a little of the same two cores. Processor time of client and scheduler (one process here)
-per image tells what they cost.
+Way
+    Rendered photographs of 1626 x 1236 pixels; a scheduler and workers of one thread each on loopback; each worker has
+    looked at a few images before the clock starts. Wall time, so run it on a machine with nothing else to do; the
+    client and the scheduler take a little of the same two cores. Processor time of client and scheduler (one process
+    here) per image tells what they cost.
+
+Run ``python validation/bench.py dask_speed``.
 """
 
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from _photographs import write_photographs
 from distributed import Client, LocalCluster
 
 from opencsp_calib import Checkerboard, Observations, detect
-from opencsp_calib.images import write_image
-from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import demo_camera, seed_poses
 
 COUNT, WARM = 200, 8
 BOARD = Checkerboard(21, 18, 0.05)
-
-
-def photographs(folder: Path) -> None:
-    """Render them."""
-    camera = demo_camera()
-    poses = seed_poses(BOARD, camera, COUNT)
-    with ThreadPoolExecutor(2) as pool:
-        list(
-            pool.map(
-                lambda i: write_image(render(camera, BOARD, poses[i], rng=i).pixels, folder / f"{i:03d}.png"),
-                range(COUNT),
-            )
-        )
 
 
 def timed(files: list[Path], **how: object) -> tuple[float, float, Observations]:
@@ -49,7 +38,8 @@ def timed(files: list[Path], **how: object) -> tuple[float, float, Observations]
 def main() -> None:
     """Print the table."""
     with tempfile.TemporaryDirectory() as temporary:
-        photographs(Path(temporary))
+        camera = demo_camera()
+        write_photographs(Path(temporary), camera, BOARD, seed_poses(BOARD, camera, COUNT))
         files = sorted(Path(temporary).iterdir())
         detect(files[:WARM], BOARD)
         one_thread, _, expected = timed(files, jobs=1)

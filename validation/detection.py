@@ -83,7 +83,7 @@ SEARCHES: dict[str, Search] = {
     "OpenCV's classic": classic,
     "SB": sector,
     "SB, exhaustive": sector_exhaustive,
-    "calib-targets 0.15.5": targets,
+    "calib-targets": targets,
 }
 
 CONDITIONS: dict[str, dict] = {

@@ -57,8 +57,7 @@ def checkerboard_parts() -> None:
     print(
         f"\n### Parts of plain checkerboards\n\n{PARTS} random boards (3 to 15 corners each way, 800 x 600) partly out "
         "of view, as many with two round things before them; views by what ours gives of them, the wrong among these: "
-        "wrong ids, or a corner more than 2 px off. Then corners given, in all. calib-targets and "
-        "`findChessboardCornersSBWithMeta` (3 x 3, larger, exhaustive) do not say which of the board's these are.\n"
+        "wrong ids, or a corner more than 2 px off. Then corners given, in all.\n"
     )
     print("| | views | whole | part | none | wrong ids | corner off | corners | SBWithMeta's | calib-targets' |")
     print("|---|---|---|---|---|---|---|---|---|---|")
@@ -88,7 +87,7 @@ def charuco_parts() -> None:
     """ChArUco boards, whole and in part, beside OpenCV."""
     print(
         f"\n### ChArUco\n\n{CHARUCOS} random boards each (3 to 13 squares each way, four dictionaries, some inverted, "
-        "some legacy, 800 x 600). OpenCV: `CharucoDetector` with its defaults. Wrong: corners more than 2 px off.\n"
+        "some legacy, 800 x 600). Wrong: corners more than 2 px off.\n"
     )
     print(
         "| | corners in view | ours | wrong | OpenCV | wrong | ours, ms | OpenCV, ms |\n"

@@ -1,11 +1,15 @@
 """Thousands of faults, and what was lost or wrong after each.
 
-Claim: after damaged files, failing disks, odd names, writers at the same time and commands stopped at any moment, no
-result is lost and none is wrong; otherwise the run ends with 1.
+Claim
+    After damaged files, failing disks, odd names, writers at the same time and commands stopped at any moment, no
+    result is lost and none is wrong; otherwise the run ends with 1.
 
-Way: the faults of ``tests/faults.py``, with 500 damaged files of each kind (or as many as the argument says); the
-commands themselves, stopped by SIGTERM and SIGKILL at random moments; and writing to a disk (a tmpfs, where that may be
-mounted) that is full.
+Way
+    The faults of ``tests/faults.py``, with 500 damaged files of each kind (or as many as the argument says); the
+    commands themselves, stopped by SIGTERM and SIGKILL at random moments; and writing to a disk (a tmpfs, where that
+    may be mounted) that is full.
+
+Run ``python validation/bench.py faults``.
 """
 
 import os

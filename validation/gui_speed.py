@@ -13,7 +13,7 @@ Way
     three searches, since one of 50 photographs is over after a few clicks.
     Memory is the most that the server's process ever held (VmHWM), Linux only; that of its worker stands beside it.
 
-Run ``python validation/gui_speed.py``: about ten minutes on two idle cores.
+Run ``python validation/bench.py gui_speed``: about ten minutes on two idle cores.
 """
 
 import http.client

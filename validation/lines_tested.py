@@ -1,11 +1,15 @@
 """Lines of the core, and whether a test runs them.
 
-Claim: tests run more than 95 % of the lines of the core (`opencsp_calib/`), and each line that none runs has an excuse.
+Claim
+    Tests run more than 95 % of the lines of the core (`opencsp_calib/`), and each line that none runs has an excuse.
 
-Way: all tests (or those named as arguments) with coverage.py, which also watches the processes that tests start: the
-window, its workers, the coach, command lines. Left out is the part in C, into which it cannot look; tests compare what
-it computes with truth. Lines that no test ran are listed with what stands in them; excuses are written by hand above
-the figures.
+Way
+    All tests (or those named as arguments) with coverage.py, which also watches the processes that tests start: the
+    window, its workers, the coach, command lines. Left out is the part in C, into which it cannot look; tests compare
+    what it computes with truth. Lines that no test ran are listed with what stands in them; excuses are written by hand
+    above the figures.
+
+Run ``python validation/bench.py lines_tested``, or ``make coverage``.
 """
 
 import json

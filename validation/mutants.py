@@ -1,13 +1,17 @@
 """Small changes to the code, and how many of them a test notices.
 
-Claim: of the changes to lens models, corners, camera files and comparison that a random sample makes, the tests of that
-part alone notice more than 85 %.
+Claim
+    Of the changes to lens models, corners, camera files and comparison that a random sample makes, the tests of that
+    part alone notice more than 85 %.
 
-Way: mutmut's operators (another number, comparison, operator, word, argument) list every change in
-a function; a sample of 40 of each part (or as many as the argument says; seeded) is drawn, each is made alone in a copy
-of the project, and the tests of its part are run. A test that fails, and one that does not end in time, has noticed.
-mutmut's own runner is not used: it knows no parts. In C, which mutmut does not know, operators are exchanged and
-numbers made larger by one. Survivors are shown, those that make no difference included.
+Way
+    mutmut's operators (another number, comparison, operator, word, argument) list every change in a function; a sample
+    of 40 of each part (or as many as the argument says; seeded) is drawn, each is made alone in a copy of the project,
+    and the tests of its part are run. A test that fails, and one that does not end in time, has noticed. mutmut's own
+    runner is not used: it knows no parts. In C, which mutmut does not know, operators are exchanged and numbers made
+    larger by one. Survivors are shown, those that make no difference included.
+
+Run ``make mutants``, or ``python validation/mutants.py [NUMBER [PART ...]]``.
 """
 
 import difflib

@@ -9,7 +9,7 @@ Way
     own bend, which is taken off. Blur wider than 2 px cannot be judged like this: with squares of down to 25 px the
     light of the next corners reaches the middle of an edge.
 
-Run ``python validation/renderer.py``.
+Run ``python validation/bench.py renderer``.
 """
 
 import sys

@@ -122,7 +122,7 @@ def sandia(python: str | None) -> None:
     """Print Sandia's table."""
     observations = detect(DATA / "sandia_checkerboard" / "*.png", SANDIA_BOARD)
     even, odd = observations.keeping(EVEN), observations.keeping(ODD)
-    print("\n## Sandia's ten photographs\n")
+    print("\n### Sandia's ten photographs\n")
     print("| way | rms px | others' rms, from even | from odd | halves: median, worst px | fx | fy | cx | cy ", end="")
     print("| spacing y/x | shear mrad | height mm | seconds |\n" + "|---" * 13 + "|")
     for name, solve in ways(python).items():
@@ -145,7 +145,7 @@ def bowed_board(python: str | None) -> None:
         photographs(Path(folder), 0.0015, 1)
         observations = detect(folder, BOWED_BOARD)
     truth = bowed(BOWED_BOARD, 0.0015)
-    print("\n## A board bowed by 1.5 mm, 20 rendered photographs: errors\n")
+    print("\n### A board bowed by 1.5 mm, 20 rendered photographs: errors\n")
     print("| way | rms px | fx | fy | cx | cy | worst px, aligned | shape mm rms | seconds |\n" + "|---" * 9 + "|")
     for name, solve in ways(python).items():
         begin = seconds()

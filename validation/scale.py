@@ -1,13 +1,17 @@
 """Two thousand images: memory, time, and runs killed again and again.
 
-Claims: the peak memory of ``detect`` and of ``calibrate --select 60`` for 2 000 images is within 20 % of that for 200;
-their time grows in proportion to the number of images; a ``detect`` that is killed (SIGKILL) at ten random moments and
-resumed gives the same observations as one run through, to the last bit, and looks at no image twice.
+Claims
+    The peak memory of ``detect`` and of ``calibrate --select 60`` for 2 000 images is within 20 % of that for 200;
+    their time grows in proportion to the number of images; a ``detect`` that is killed (SIGKILL) at ten random moments
+    and resumed gives the same observations as one run through, to the last bit, and looks at no image twice.
 
-Way: 2 000 rendered photographs of 480 x 360 pixels, all different; the commands as users run them, each in a process of
-its own. Memory is the peak resident set of the whole process. Time is processor time, user and system, since other work
-on the machine does not count in it; a run of 20 images gives the start-up, which is taken off. Images looked at are
-counted by the lines of the journal after every kill.
+Way
+    2 000 rendered photographs of 480 x 360 pixels, all different; the commands as users run them, each in a process of
+    its own. Memory is the peak resident set of the whole process. Time is processor time, user and system, since other
+    work on the machine does not count in it; a run of 20 images gives the start-up, which is taken off. Images looked
+    at are counted by the lines of the journal after every kill.
+
+Run ``python validation/bench.py scale``.
 """
 
 import os
@@ -18,16 +22,14 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
+from _photographs import write_photographs
 
 from opencsp_calib import Camera, Checkerboard
 from opencsp_calib.hdf5_calibration import load_observations
-from opencsp_calib.images import write_image
 from opencsp_calib.journal import journal_beside
-from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import seed_poses
 
 SPEC, BOARD = "checkerboard:9x6:30mm", Checkerboard(9, 6, 0.03)
@@ -35,16 +37,15 @@ CAMERA = Camera("small", "opencv4", [600.0, 600.0, 245.0, 178.0, -0.12, 0.05, 1e
 FEW, SOME, MANY, KILLS = 20, 200, 2000, 10
 
 
-def photographs(folder: Path, count: int) -> None:
-    """Render them; the smaller folders link to the first of them."""
-    poses = seed_poses(BOARD, CAMERA, count, rng=5)
-    order = np.random.default_rng(6).permutation(count)  # so that the first are not all horizontal
-
-    def one(index: int) -> None:
-        write_image(render(CAMERA, BOARD, poses[order[index]], rng=index).pixels, folder / f"{index:04d}.png")
-
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(one, range(count)))
+def photographs(root: Path) -> None:
+    """Render the largest folder; the smaller ones link to its first."""
+    poses = seed_poses(BOARD, CAMERA, MANY, rng=5)
+    order = np.random.default_rng(6).permutation(MANY)  # so that the first are not all horizontal
+    write_photographs(root / str(MANY), CAMERA, BOARD, [poses[index] for index in order])
+    for count in (FEW, SOME):
+        (root / str(count)).mkdir()
+        for file in sorted((root / str(MANY)).iterdir())[:count]:
+            os.link(file, root / str(count) / file.name)
 
 
 def measured(*arguments: str) -> tuple[float, float]:
@@ -111,12 +112,7 @@ def main() -> None:
     """Run all of it."""
     with tempfile.TemporaryDirectory() as temporary:
         root = Path(temporary)
-        for count in (FEW, SOME, MANY):
-            (root / str(count)).mkdir()
-        photographs(root / str(MANY), MANY)
-        for count in (FEW, SOME):
-            for index in range(count):
-                os.link(root / str(MANY) / f"{index:04d}.png", root / str(count) / f"{index:04d}.png")
+        photographs(root)
         growth(root)
         killed(root)
 

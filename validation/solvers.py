@@ -81,7 +81,7 @@ def unaligned_px(a: Camera, b: Camera) -> float:
 
 def exact() -> None:
     """Print how far from the truth solvers end that are given it."""
-    print("## From exact pixels\n")
+    print("### From exact pixels\n")
     print("| world | model | solver | worst px | worst px, aligned | rms px |\n|---|---|---|---|---|---|")
     worlds = [("seed's", "opencv4", seed_world(50, 0.0))]
     worlds += [("wide", model, wide_world(model, 0.0)) for model in ("pinhole", "opencv5", "opencv8", "opencv12")]
@@ -95,7 +95,7 @@ def exact() -> None:
 def agreement() -> None:
     """Print how far from each other solvers end that are given the same."""
     print(
-        "\n## One minimum\n\n| observations | model | solvers | worst px | worst px, aligned |\n|---|---|---|---|---|"
+        "\n### One minimum\n\n| observations | model | solvers | worst px | worst px, aligned |\n|---|---|---|---|---|"
     )
     left = []
     sets = [("Sandia", model, sandia()) for model in ("pinhole", "opencv4", "opencv5", "opencv8")]
@@ -130,7 +130,9 @@ def agreement() -> None:
 
 def times() -> None:
     """Print how long solvers take."""
-    print("\n## Time, opencv4, 418 corners a view\n\n| views |", " | ".join(f"{n} s (of opencv)" for n in SOLVERS), "|")
+    print(
+        "\n### Time, opencv4, 418 corners a view\n\n| views |", " | ".join(f"{n} s (of opencv)" for n in SOLVERS), "|"
+    )
     print("|---|" + "---|" * len(SOLVERS))
     for views in (50, 200, 1000):
         _, observations = seed_world(views, NOISE_PX)

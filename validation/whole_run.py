@@ -1,14 +1,19 @@
 """How long the whole command takes, and how much memory, against bare scripts of the same OpenCV calls.
 
-Claim: from 50 images of 1626x1236, ``--preset opencsp`` takes at most 1.5 times the wall time of a script that makes
-the same OpenCV calls one after another; the default, with fitted corners, honest uncertainty and the board's shape
-decided, at most 1.5 times the seed's way; from 200 images it is at least 3 times quicker than the seed's way with the
-OpenCV below 4.10 that OpenCSP pins. Peak memory does not grow with the number of images by more than their corners.
+Claim
+    From 50 images of 1626 x 1236, ``--preset opencsp`` takes at most 1.5 times the wall time of a script that makes the
+    same OpenCV calls one after another; the default, with fitted corners, honest uncertainty and the board's shape
+    decided, at most 1.5 times the seed's way; from 200 images it is at least 3 times quicker than the seed's way with
+    the OpenCV below 4.10 that OpenCSP pins. Peak memory does not grow with the number of images by more than their
+    corners.
 
-Way: rendered photographs; each command in a process of its own, start-up included, by turns and in alternating order,
-where there are several runs after one that warms the caches; ratios of the least times, and of the least CPU times
-(user and system). The pinned OpenCV is installed with pip into an environment of its own, or the Python of one is named
-as an argument. Memory is the peak resident set of the whole process.
+Way
+    Rendered photographs; each command in a process of its own, start-up included, by turns and in alternating order,
+    where there are several runs after one that warms the caches; ratios of the least times, and of the least processor
+    times (user and system). The pinned OpenCV is installed with pip into an environment of its own, or the Python of
+    one is named as an argument. Memory is the peak resident set of the whole process.
+
+Run ``python validation/bench.py whole_run``.
 """
 
 import os
@@ -17,14 +22,13 @@ import subprocess
 import sys
 import tempfile
 import time
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from venv import EnvBuilder
 
+from _photographs import write_photographs
+
 from opencsp_calib import Camera, Checkerboard
-from opencsp_calib.images import write_image
-from opencsp_calib.rendering import render
 from opencsp_calib.synthetic import demo_camera, seed_poses
 
 SEEDS_WAY = """
@@ -81,15 +85,8 @@ def _peak_mb(pid: int) -> float:
 
 def photographs(folder: Path, count: int, camera: Camera) -> None:
     """Render photographs as the seed's procedure asks for them."""
-    folder.mkdir()
     board = Checkerboard(21, 18, 0.05)
-    poses = seed_poses(board, camera, count)
-
-    def write(index: int) -> None:
-        write_image(render(camera, board, poses[index], rng=index).pixels, folder / f"{index:04d}.png")
-
-    with ThreadPoolExecutor(2) as pool:
-        list(pool.map(write, range(count)))
+    write_photographs(folder, camera, board, seed_poses(board, camera, count))
 
 
 def ours(folder: Path, *options: str) -> list[str]:

@@ -8,14 +8,13 @@ from pathlib import Path
 
 import cv2
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from opencsp_calib import Camera, Checkerboard
 from opencsp_calib.arrays import Matrix
 from opencsp_calib.image import Image
 from opencsp_calib.rendering import render
 from opencsp_calib.rendering.scene import Exposure, Scene, Spot
-from opencsp_calib.synthetic import pose_in_view
+from opencsp_calib.synthetic import pose_in_view, turned
 
 IMAGES = Path(__file__).resolve().parents[1] / "images"
 CAMERA = Camera("capture", "opencv4", np.array([620.0, 620.0, 239.5, 182.5, -0.17, 0.1, 0.0, 0.0]), (480, 366))
@@ -25,19 +24,17 @@ LAMP = Spot(300.0, 150.0, 45.0, 260.0)
 SHADOW = Scene(shading=(1.9, -0.3))
 
 
-def turned(tilt_deg: float, azimuth_deg: float, roll_deg: float = 0.0) -> Matrix:
-    """Board to camera: rolled in its own plane, then tilted about an axis across the line of sight."""
-    azimuth = np.deg2rad(azimuth_deg)
-    tilt = Rotation.from_rotvec(np.deg2rad(tilt_deg) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0]))
-    return np.asarray((tilt * Rotation.from_euler("z", roll_deg, degrees=True)).as_matrix())
+def held(tilt_deg: float, azimuth_deg: float, roll_deg: float = 0.0) -> Matrix:
+    """Board to camera."""
+    return turned(*np.radians([tilt_deg, azimuth_deg, roll_deg]))
 
 
-TILTED = turned(37.0, 60.0)
+TILTED = held(37.0, 60.0)
 PHOTOGRAPHS = {  # name: how the board is held, how large, where in the image, scene, exposure
     "good_horizontal": (TILTED, 0.97, (0.5, 0.5), Scene(), SHARP),
-    "good_vertical": (turned(35.0, 160.0, 90.0), 0.97, (0.5, 0.5), Scene(room=1), SHARP),
-    "good_corner": (turned(40.0, 250.0), 0.75, (1.0, 0.0), Scene(room=2), SHARP),
-    "bad_head_on": (turned(2.0, 30.0), 0.9, (0.5, 0.5), Scene(), SHARP),
+    "good_vertical": (held(35.0, 160.0, 90.0), 0.97, (0.5, 0.5), Scene(room=1), SHARP),
+    "good_corner": (held(40.0, 250.0), 0.75, (1.0, 0.0), Scene(room=2), SHARP),
+    "bad_head_on": (held(2.0, 30.0), 0.9, (0.5, 0.5), Scene(), SHARP),
     "bad_small": (TILTED, 0.33, (0.4, 0.5), Scene(), SHARP),
     "bad_glare": (TILTED, 0.97, (0.5, 0.5), Scene(glare=(LAMP,)), SHARP),
     "bad_shadow": (TILTED, 0.97, (0.5, 0.5), SHADOW, SHARP),

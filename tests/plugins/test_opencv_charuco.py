@@ -219,13 +219,10 @@ def test_a_hundred_megapixels() -> None:
 
 # Properties
 
-SEARCH = settings(
-    max_examples=25,
-)
 UNIT = st.floats(0, 1)
 
 
-@SEARCH
+@settings(max_examples=25)
 @given(
     grid=st.tuples(st.integers(3, 10), st.integers(3, 10)),
     marker=st.floats(0.6, 0.8),
