@@ -1,4 +1,4 @@
-"""What all tests share: where the real data is."""
+"""What all tests share: how examples are drawn, the real data, and a small world in photographs and a camera file."""
 
 import os
 import tempfile

@@ -9,7 +9,7 @@ from pathlib import Path
 
 
 class Environment:
-    """A throw-away environment that pip of this one installs into, without asking the network for anything."""
+    """An environment that borrows the packages of this one; pip installs into it without asking the network."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

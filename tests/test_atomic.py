@@ -11,15 +11,13 @@ from opencsp_calib.atomic import replacing
 STOPPED_WHILE_SAVING = """
 import signal, sys
 import h5py
-from opencsp_calib import Camera
 from opencsp_calib.cli import run
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that started the tests aside has them ignore it
-camera = Camera("left", "opencv4", [2700, 2700, 830, 630, -0.2, 0.1, 0, 0], (1626, 1236))
 written = h5py.Group.create_dataset
 
 def stopped(self, name, *args, **options):
-    signal.raise_signal(signal.SIGINT)  # as Ctrl-C does: Python's handler runs at the next instruction
+    signal.raise_signal(signal.SIGINT)  # as Ctrl-C does: Python's handler runs in the main thread, which waits for this
     return written(self, name, *args, **options)
 
 h5py.Group.create_dataset = stopped

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from bundle_worlds import codes
 from opencsp_calib_bundle.solver import BundleSolver
 from scipy.spatial.transform import Rotation
 
@@ -26,10 +27,6 @@ def world(
 ) -> Observations:
     true = bowed(board, bow_m)
     return observe(CAMERA, true, seed_poses(board, CAMERA, views, seed), noise_px=noise_px, rng=seed, nominal=board)
-
-
-def codes(calibration: Calibration) -> set[str]:
-    return {problem.code for problem in calibration.problems}
 
 
 def said(calibration: Calibration) -> str:

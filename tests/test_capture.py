@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from worlds import SmallWorld
 
-from opencsp_calib import InputError, Pose
-from opencsp_calib.capture import Capture, CaptureFolder, Release, release_from
+from opencsp_calib import Board, InputError, Pose
+from opencsp_calib.capture import Capture, CaptureFolder, Release, State, release_from
 from opencsp_calib.image import Image
 from opencsp_calib.images import ImageFile, read_image
 from opencsp_calib.looking import Search
@@ -19,13 +19,15 @@ from opencsp_calib.rendering import Exposure, Scene, Spot, render
 from opencsp_calib.synthetic import pose_in_view, turned
 
 SPEC = SmallWorld.spec
-
-
 COACH = Release("coach")
 
 
 def folder_of(path: Path, board: str = SPEC) -> CaptureFolder:
     return CaptureFolder.opened(path, board, "folder", "incoming")
+
+
+def search_for(board: Board) -> Search:
+    return Search(board, installed().detector("checkerboard"), "model")
 
 
 def grey(level: int, side: int = 8) -> Image:
@@ -60,11 +62,10 @@ class Frames:
 
 def released(frames: Frames, path: Path, release=COACH, *, waiting: bool = True) -> list[str]:
     """Names of the frames that became photographs, the coach being given the time to learn after each, or not."""
-    search = Search(frames.world.board, installed().detector("checkerboard"), "model")
-    capture = Capture(folder_of(path), search, release, 50)
+    capture = Capture(folder_of(path), search_for(frames.world.board), release, 50)
     taken: list[str] = []
 
-    def show(state) -> None:
+    def show(state: State) -> None:
         if state.new:
             taken.append(state.moment.glance.image.name.split(" ", 1)[1])
             while waiting and capture.behind:
@@ -153,15 +154,20 @@ def test_what_a_killed_capture_left_is_cleared_and_another_board_refused(tmp_pat
 
 
 def test_an_image_of_another_size_stops_it(small_world, tmp_path):
-    search = Search(small_world.board, installed().detector("checkerboard"), "model")
-    capture = Capture(folder_of(tmp_path), search, Release("interval", 0.0), 5)
+    capture = Capture(folder_of(tmp_path), search_for(small_world.board), Release("interval", 0.0), 5)
     with pytest.raises(InputError, match="16x16 but those before were 64x64"):
         capture.run(iter([grey(1, 64), grey(2, 16)]), lambda state: None)
     assert len(capture.folder.images) == 1
 
 
 def test_a_photograph_is_deleted_also_where_no_frame_comes_after_it(small_world, tmp_path):
-    search = Search(small_world.board, installed().detector("checkerboard"), "model")
-    capture = Capture(folder_of(tmp_path), search, Release("interval", 0.0), 5)
-    capture.run(iter([grey(1, 64)]), lambda state: capture.delete_last())
+    capture = Capture(folder_of(tmp_path), search_for(small_world.board), Release("interval", 0.0), 5)
+    taken = []
+
+    def show(state: State) -> None:
+        taken.append(state.new)
+        capture.delete_last()
+
+    capture.run(iter([grey(1, 64)]), show)
+    assert taken == ["0001.png"]
     assert capture.folder.images == ()
