@@ -22,7 +22,7 @@ from opencsp_calib.jacobian import CORNER, ViewRows
 from opencsp_calib.normal_equations import NormalEquations
 from opencsp_calib.schur import Factorisation
 
-__all__ = ["growth_without_each_view", "jackknife_correction"]
+__all__ = ["growth_without_each_view", "jackknife_correction", "sigmas_that_hold"]
 
 MISSED = 0.05  # of the truth, by the intervals that are to hold what they say; at other confidences they nearly do
 NODES = 32  # of the integral: nine digits
@@ -39,15 +39,15 @@ def jackknife_correction(whole: Factorisation) -> float:
     whole : Factorisation
         As `growth_without_each_view` takes it.
     """
-    from scipy.special import stdtrit
-
     growth = growth_without_each_view(whole)
     _, directions = np.linalg.eigh(growth.sum(axis=0))
     along = np.einsum("pi,vpq,qi->iv", directions, growth, directions)
-    return float(_sigmas_that_hold(along).mean() / stdtrit(len(growth) - 1, 1.0 - 0.5 * MISSED))
+    equal = np.full((1, len(growth)), 1.0 / (len(growth) - 1))  # whose number is Student's t
+    *unequal, student = sigmas_that_hold(np.concatenate([along, equal]))
+    return float(np.mean(unequal) / student)
 
 
-def _sigmas_that_hold(along: Floats) -> Floats:
+def sigmas_that_hold(along: Floats) -> Floats:
     """(Q,) how many jackknife sigmas miss the truth as often as is allowed.
 
     By Craig's form of the normal distribution's tail, an integral over an angle of exponentials of its square: the mean

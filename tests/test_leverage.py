@@ -7,7 +7,7 @@ import pytest
 from dense_equations import SHAPES, Dense, scaled_pinv, without_view, world
 from scipy.stats import t as student
 
-from opencsp_calib.leverage import growth_without_each_view, jackknife_correction
+from opencsp_calib.leverage import growth_without_each_view, jackknife_correction, sigmas_that_hold
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.schur import factorise
 from opencsp_calib.uncertainty import jackknife_covariance
@@ -31,6 +31,12 @@ def test_views_of_equal_weight_need_no_correction():
     equal = factorise(replace(equations, dense=np.repeat(equations.dense.mean(axis=0)[None], 12, axis=0)))
     assert growth_without_each_view(equal) == pytest.approx(np.tile(np.eye(8) / 11, (12, 1, 1)), abs=1e-8)
     assert jackknife_correction(equal) == pytest.approx(1.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("views", [2, 3, 10, 50, 1000])
+def test_of_views_of_equal_weight_the_number_is_students_t(views):
+    equal = np.full((1, views), 1 / (views - 1))
+    assert sigmas_that_hold(equal)[0] == pytest.approx(student.ppf(0.975, views - 1), rel=1e-8)
 
 
 @pytest.mark.parametrize(("views", "seed", "heavy"), [(6, 1, 1.0), (20, 4, 1.0), (12, 3, 20.0)])
