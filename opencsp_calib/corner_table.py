@@ -173,9 +173,13 @@ class CornerTable:
 
 def _typical_variance(detections: Sequence[Detection]) -> float:
     """Px² the median over corners and axes; 1 where no corner has a usable covariance."""
-    known = [d.covariance[:, [0, 1], [0, 1]][_usable(d.covariance)] for d in detections if d.covariance is not None]
-    diagonals = np.concatenate([np.empty((0, 2)), *known])
-    return float(np.median(diagonals, overwrite_input=True)) if len(diagonals) else 1.0
+    diagonals, end = np.empty((sum(map(len, detections)), 2)), 0
+    for detection in detections:
+        if detection.covariance is not None:
+            known = detection.covariance[:, [0, 1], [0, 1]][_usable(detection.covariance)]
+            diagonals[end : end + len(known)] = known
+            end += len(known)
+    return float(np.median(diagonals[:end], overwrite_input=True)) if end else 1.0
 
 
 def _usable(covariances: Covariances) -> Mask:

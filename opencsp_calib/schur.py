@@ -55,7 +55,7 @@ class Factorisation(ABC):
     def shared_covariance(self) -> Matrix:
         """(M, M) inverse of the shared unknowns' information; multiply by s² for their covariance."""
         shared = self.equations.unknowns.shared
-        half = np.linalg.inv(self.root.lower[-shared:, -shared:]) * self.scale[-shared:]
+        half = np.linalg.inv(np.tril(self.root.lower[-shared:, -shared:])) * self.scale[-shared:]
         return np.asarray(half.T @ half)
 
     @property
@@ -224,7 +224,10 @@ def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[tu
 
 
 def _zeros_apart(size: int) -> Matrix:
-    """(size, size) in memory of their own, which goes back to the system with them: a heap would keep it."""
+    """(size, size) in memory of their own, which goes back to the system with them: a heap would keep it.
+
+    Where nothing is written, as above the diagonal, they take none.
+    """
     memory = mmap.mmap(-1, size * size * np.dtype(np.float64).itemsize)
     return np.frombuffer(memory, dtype=np.float64).reshape(size, size)
 
@@ -260,8 +263,10 @@ def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     if not (diagonal > 0).all():
         raise np.linalg.LinAlgError("an unknown is not observed at all")
     scale = 1.0 / np.sqrt(diagonal)
-    dense *= scale[:, None]
-    dense *= scale
+    for first in range(0, len(dense), STRIP):  # the strips of the lower triangle, as `_add_lower` goes over them
+        strip = slice(first, min(first + STRIP, len(dense)))
+        dense[strip, : strip.stop] *= scale[strip, None]
+        dense[strip, : strip.stop] *= scale[: strip.stop]
     if gauge.any():
         free, _ = np.linalg.qr(gauge / scale[: len(gauge), None])
         _add_lower(dense[: len(gauge), : len(gauge)], free.T, free.T)

@@ -22,6 +22,7 @@ class CholeskyRoot:
     Parameters
     ----------
     lower : (n, n)
+        Above its diagonal blocks is whatever was there.
     inverses : tuple of (b, b)
         Of its diagonal blocks, from the first down.
     """
@@ -33,7 +34,8 @@ class CholeskyRoot:
     def of(cls, matrix: Matrix) -> "CholeskyRoot":
         """The root of a positive definite matrix (n, n), left in its place: it may be the largest thing in memory.
 
-        Nothing but the lower triangle is read.
+        Nothing but the lower triangle is read, and nothing beyond its diagonal blocks written to: what nobody has
+        touched may not even be in memory.
 
         Raises
         ------
@@ -47,7 +49,6 @@ class CholeskyRoot:
             root = np.linalg.cholesky(left[: end - first])
             inverses.append(np.asarray(np.linalg.inv(root), dtype=np.float64))
             matrix[first:end, first:end] = root
-            matrix[first:end, end:] = 0.0
             matrix[end:, first:end] = left[end - first :] @ inverses[-1].T
         return cls(matrix, tuple(inverses))
 
