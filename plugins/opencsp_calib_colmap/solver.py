@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from opencsp_calib import Calibration, CalibrationFailedError, Camera, Observations, Pose, SolveOptions
+from opencsp_calib import Calibration, CalibrationFailedError, Camera, InputError, Observations, Pose, SolveOptions
 from opencsp_calib.arrays import Floats, Mask, Points
 from opencsp_calib.convergence import determined
 from opencsp_calib.corner_table import CornerTable
@@ -58,6 +58,10 @@ class ColmapSolver:
         table = CornerTable.of(observations.detections)
         times = np.bincount(table.ids, minlength=len(observations.board.points))
         free = options.board_shape == "free"
+        once = 0 if free else int((times == 1).sum())
+        if once:
+            message = f"COLMAP takes no corner that one view alone sees, and there are {once}; take another solver"
+            raise InputError(message)
         # of a free point that one view alone sees COLMAP wants to know nothing
         scene = _scene(pycolmap, observations, camera, poses, unit, times > (1 if free else 0))
         _adjust(pycolmap, scene, free=free)

@@ -9,7 +9,7 @@ from solver_worlds import SEED_BOARD, seed_world, worst_px
 from opencsp_calib.camera import Camera
 from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.detection import Detection, Observations, View
-from opencsp_calib.errors import CalibrationFailedError
+from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
@@ -66,6 +66,8 @@ def test_corners_seen_once_or_never_do_not_bend_the_board():
     np.testing.assert_array_equal(calibration.board.points[never], SEED_BOARD.points[never])
     assert np.abs(calibration.board.points - SEED_BOARD.points).max() < 1e-3
     assert calibration.rms_px < 1e-5
+    with pytest.raises(InputError, match="one view alone sees, and there are 1"):
+        solved(seen)  # where COLMAP fails, with a message about its source
 
 
 def test_corners_beside_the_camera_are_not_dropped_in_silence():
