@@ -21,7 +21,7 @@ from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
-from opencsp_calib.interfaces import Solver
+from opencsp_calib.interfaces import Detector, Solver
 from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Refine, Search
 from opencsp_calib.models import lens_model
@@ -70,7 +70,7 @@ def detect(
     images: Images,
     board: Board,
     *,
-    detector: str | None = None,
+    detector: str | Detector | None = None,
     refine: Refine | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
@@ -85,8 +85,8 @@ def detect(
     images : path, or several
         Files, folders or glob patterns.
     board : Board
-    detector : str, optional
-        Its name; by default the one for this kind of board.
+    detector : str or Detector, optional
+        Its name, or one that is not installed itself; by default the one for this kind of board.
     refine : 'none', 'subpix' or 'model', optional
         How corners are located once found: as the detector gives them, by OpenCV's sub-pixel search, or by fitting
         the image of a corner. By default 'model' for corners of a checkerboard.
@@ -116,7 +116,7 @@ def detect(
     """
     registry = installed()
     files = find_images(images)
-    finder = registry.detector(detector) if detector else registry.detector_for(board)
+    finder = registry.detector(detector) if isinstance(detector, str) else detector or registry.detector_for(board)
     if not finder.supports(board):
         raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}")
     search = Search(board, finder, refine or ("model" if finder.feature == "corner" else "none"))

@@ -125,17 +125,17 @@ class Window:
 
     def tick(self, testid: str, index: int) -> None:
         """Press the checkbox of a row."""
-        rows = f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr"
-        self.until(lambda: self._pressed(self.find_all(rows)[index].find_element("css selector", ".q-checkbox")))
+        boxes = f"[data-testid={testid}] tbody input[type=checkbox]"
+        self.until(lambda: self._pressed(self.find_all(boxes)[index]))
 
     def rows(self, testid: str) -> list[list[str]]:
-        """The words in a table, but for the cells of its checkboxes; long tables have fillers for rows out of sight."""
+        """The words in a table, but for the cells of its checkboxes."""
         # read in one go: the table may be made anew between two questions
         script = (
             "return [...document.querySelectorAll(arguments[0])].map("
             "row => [...row.querySelectorAll('td')].slice(1).map(cell => cell.innerText.trim()))"
         )
-        rows = f"[data-testid={testid}] tbody:not(.q-virtual-scroll__padding) tr"
+        rows = f"[data-testid={testid}] tbody tr"
         return [list(map(str, row)) for row in self.browser.execute_script(script, rows)]
 
     def tab(self, name: str) -> None:

@@ -9,7 +9,7 @@ Way
     Photographs of the demo, and for 500 ten of each, told apart by bytes after their end. Headless Chromium driven as
     in the tests, so that uploads, pictures in the page and the download are in the time; the same files and options by
     the command line in the same run. Answers are those to clicks on tabs and on the button for the page's colours, from
-    the click to the frame that shows what the server answers, 0.2 s after each other while corners are looked for; of
+    the click to the frame that shows what the page answers, 0.2 s after each other while corners are looked for; of
     three searches, since one of 50 photographs is over after a few clicks.
     Memory is the most that the server's process ever held (VmHWM), Linux only; that of its worker stands beside it.
 
@@ -89,7 +89,7 @@ CLICKS = (
     (TAB.format("Calibrate"), "//*[@data-testid='images']"),
     ("//button[starts-with(@aria-label, 'Colours')]", "//button[@aria-label='Colours: as the system']"),
 )
-"""What is clicked in turn, and what is there once it is answered: the server decides all of these."""
+"""What is clicked in turn, and what is there once it is answered: the server decides all but the colours."""
 
 
 def by_window(window: Window, images: list[Path], *, asking: bool) -> tuple[float, list[float]]:

@@ -8,6 +8,7 @@
     offered.py   what plugins offer here
     work.py      hands long work to jobs.py, which runs in a process of its own;
     live_capture.py does so with a capture, to capture_job.py
+    thumbnails.py  made where a photograph is decoded anyway
     files.py     which files may be touched             routes.py  photographs in, thumbnails and results out
     page.py      the page, and which file each of its sections is in
     *.js         the few elements that NiceGUI does not have; style.css, how all of it looks

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["build"]
 
 COLUMNS: list[dict[str, Any]] = [
-    {"name": "image", "label": "The five worst", "field": "image", "align": "left"},
-    {"name": "rms", "label": "rms (px)", "field": "rms"},
+    {"name": "image", "label": "The five worst", "align": "left"},
+    {"name": "rms", "label": "rms (px)"},
 ]
 
 

@@ -7,7 +7,7 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from opencsp_calib.errors import InputError
-from opencsp_calib.gui.controls import action, choice, field, quiet_action
+from opencsp_calib.gui.controls import Part, action, choice, field, quiet_action
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.live_capture import SHOWN_PX, LiveCapture
 from opencsp_calib.gui.procedure import find_and_calibrate
@@ -28,11 +28,11 @@ def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     live = page.session.capture
     with ui.element("div").classes("columns capture"):
-        with ui.element("div").classes("steps"):
+        with Part("div").classes("steps"):
             refresh_controls = _controls(page, live)
-        with ui.element("main").classes("results live"):
+        with Part("main").classes("results live"):
             refresh_picture = _picture(live)
-        with ui.element("div").classes("told"):
+        with Part("div").classes("told"):
             refresh_gauges = _gauges(live)
 
     def refresh() -> None:

@@ -1,5 +1,6 @@
 """Tables of photographs; which of them are selected is shared by all tables of the page."""
 
+import json
 from typing import TYPE_CHECKING, Any
 
 from nicegui.element import Element
@@ -17,17 +18,18 @@ class PhotographTable(Element, component="photograph_table.js"):
     def __init__(self, page: "Page", columns: list[dict[str, Any]]) -> None:
         super().__init__()
         self._page = page
-        self._props.update(columns=columns, rows=[], selected=[])
+        self._here: set[str] = set()
+        self._props.update(columns=columns, rows="[]", selected=[])
         self.on("select", self._select).on("look", lambda event: page.look_at(event.args))
 
     def fill(self, rows: list[dict[str, Any]]) -> None:
         """Show rows, and which of them are selected."""
+        self._here = {row["image"] for row in rows}
         chosen = [row["image"] for row in rows if row["image"] in self._page.selected]
-        for name, value in (("rows", rows), ("selected", chosen)):
+        for name, value in (("rows", json.dumps(rows)), ("selected", chosen)):
             if self._props[name] != value:
                 self.props[name] = value
 
     def _select(self, event: GenericEventArguments) -> None:
-        here = {row["image"] for row in self._props["rows"]}
-        self._page.selected = (self._page.selected - here) | set(event.args)
+        self._page.selected = (self._page.selected - self._here) | set(event.args)
         self._page.refresh()

@@ -1,11 +1,20 @@
-"""The page's buttons and fields, made alike."""
+"""The page's parts, buttons and fields, made alike."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from nicegui import ui
+from nicegui.element import Element
 
-__all__ = ["action", "choice", "field", "offer", "quiet_action", "set_prop"]
+__all__ = ["Part", "action", "choice", "field", "offer", "quiet_action", "set_prop"]
+
+
+class Part(Element, component="part.js"):
+    """A part of the page, as an element with this tag; see the component."""
+
+    def __init__(self, tag: str) -> None:
+        super().__init__()
+        self._props["tag"] = tag
 
 
 def action(label: str, on_click: Callable[[], Any], testid: str = "") -> ui.button:

@@ -11,7 +11,7 @@ import queue
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict
 from typing import IO, Any, TypeAlias
 
@@ -61,23 +61,39 @@ def _tell(told: IO[str], answer: dict[str, Any]) -> None:
 
 
 def find_corners(
-    tell: Tell, images: list[str], board: str, options: Mapping[str, Any], observations: str, journal: str
+    tell: Tell,
+    images: list[str],
+    board: str,
+    options: dict[str, Any],
+    observations: str,
+    journal: str,
+    thumbnails: str,
 ) -> None:
     """Look for the board in photographs; tells each view as it is done, and writes a file of observations.
 
     What the journal knows is not looked for again: a search that was cancelled goes on, and one of a few photographs
     more looks at those only.
     """
+    from pathlib import Path
+
     from opencsp_calib import pipeline
     from opencsp_calib.detection import View
+    from opencsp_calib.gui.thumbnails import KeepingThumbnails, Thumbnails
     from opencsp_calib.hdf5_calibration import save_observations
+    from opencsp_calib.images import find_images
     from opencsp_calib.journal import Journal
+    from opencsp_calib.registry import installed
     from opencsp_calib.summary import view_as_json
 
     def progress(done: int, total: int, view: View) -> None:
         tell({"done_images": done, "total": total, "view": view_as_json(view)})
 
-    found = pipeline.detect(images, pipeline.board_from(board), progress=progress, journal=Journal(journal), **options)
+    target, known = pipeline.board_from(board), installed()
+    chosen = options.pop("detector", None)
+    detector = known.detector(chosen) if chosen else known.detector_for(target)
+    paths = {file.name: file.path for file in find_images(images)}
+    keeping = KeepingThumbnails(detector, Thumbnails(Path(thumbnails)), paths)
+    found = pipeline.detect(images, target, detector=keeping, progress=progress, journal=Journal(journal), **options)
     save_observations(found, observations)
 
 

@@ -12,6 +12,7 @@ from importlib.resources import files
 from typing import TypeAlias
 
 from nicegui import ui
+from nicegui.element import Element
 
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui import (
@@ -33,6 +34,7 @@ from opencsp_calib.gui import (
     viewer,
     views,
 )
+from opencsp_calib.gui.controls import Part
 from opencsp_calib.gui.session import Session
 
 __all__ = ["Page", "show"]
@@ -66,6 +68,10 @@ TABS: tuple[tuple[str, Build], ...] = (
     ("About", about.build),
 )
 BEFORE_CALIBRATION = ("Photographs", "Found corners")
+
+
+class ColoursButton(Element, component="colours.js"):
+    """The button for the page's colours; see the component."""
 
 
 class Page:
@@ -110,30 +116,30 @@ class Page:
 
     def build(self) -> None:
         """Make all elements."""
-        with ui.element("header").classes("head"):
+        with Part("header").classes("head"):
             ui.label("Camera calibration").classes("title")
             ui.label(str(self.session.folder)).classes("quiet path")
             with ui.tabs().props("no-caps dense inline-label").classes("pages") as self._pages:
                 for name in ("Calibrate", *dict(TABS)):
                     ui.tab(name)
-            _theme_button()
+            ColoursButton()
         with ui.tab_panels(self._pages, value="Calibrate", animated=False).classes("panels body"):
             with ui.tab_panel("Calibrate").classes("bare"):
                 self._build_calibrate()
             for name, build in TABS:
                 self._seldom[name] = self._when_shown(ui.tab_panel(name).classes("page"), build)
         self._pages.on_value_change(self.refresh)
-        with ui.element("footer").classes("foot"):
+        with Part("footer").classes("foot"):
             self._always.append(status.build(self))
 
     def _build_calibrate(self) -> None:
         with ui.element("div").classes("columns"):
             with ui.element("div").classes("steps"):
                 for number, (title, build) in enumerate(STEPS, start=1):
-                    with ui.element("section").classes("step"):
+                    with Part("section").classes("step"):
                         ui.html(f"<h2><span>{number}</span>{title}</h2>", sanitize=False)
                         self._always.append(build(self))
-            with ui.element("main").classes("results"):
+            with Part("main").classes("results"):
                 with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
                     self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
                 with ui.tab_panels(self._results, value=RESULTS[0][0], animated=False).classes("panels"):
@@ -178,16 +184,3 @@ def show(session: Session) -> None:
 
 def _style(package: str) -> str:
     return (files("opencsp_calib") / package / "style.css").read_text(encoding="utf-8")
-
-
-def _theme_button() -> None:
-    dark = ui.dark_mode(None)
-    following = {None: True, True: False, False: None}
-    icons = {None: "brightness_auto", True: "dark_mode", False: "light_mode"}
-    names = {None: "as the system", True: "dark", False: "light"}
-
-    def turn() -> None:
-        dark.value = following[dark.value]
-        button.props(f'icon={icons[dark.value]} aria-label="Colours: {names[dark.value]}"')
-
-    button = ui.button(on_click=turn).props('flat round dense icon=brightness_auto aria-label="Colours: as the system"')

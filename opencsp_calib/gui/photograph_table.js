@@ -1,41 +1,84 @@
-// A table whose rows are photographs: a click selects one, one on its name opens it.
-// It is drawn anew only when its own rows or selection change, not with every other element of the page.
+// A table whose rows are photographs: a click selects one, one on its name opens it, one on a column's name sorts.
+// Its rows come as one text, and a row is drawn anew only when it changes: the page must answer while hundreds come in.
 export default {
   template: `
-    <q-table flat dense hide-bottom row-key="image" selection="multiple" :columns="columns" :rows="rows" :selected="picked"
-      :pagination="all" @update:selected="pick" @row-click="toggle">
-      <template #body-cell-picture="cell">
-        <q-td :props="cell"><img class="thumbnail" loading="lazy" :src="cell.row.picture" alt="" /></q-td>
-      </template>
-      <template #body-cell-image="cell">
-        <q-td :props="cell">
-          <a class="name" href="#" role="button" @click.stop.prevent="$emit('look', cell.row.image)">{{ cell.row.image }}</a>
-        </q-td>
-      </template>
-    </q-table>`,
-  props: { columns: Array, rows: Array, selected: Array },
+    <div class="photographs">
+      <table>
+        <thead>
+          <tr>
+            <th class="box"><input type="checkbox" aria-label="All" :checked="all" :indeterminate="some && !all" @change="pickAll" /></th>
+            <th v-for="column in columns" :key="column.name" :class="column.align" :data-column="column.name" :aria-sort="order(column)">
+              <button v-if="column.sortable" type="button" @click="sort(column.name)">{{ column.label }}</button>
+              <template v-else>{{ column.label }}</template>
+            </th>
+          </tr>
+        </thead>
+        <tbody>
+          <tr v-for="row in sorted" :key="row.image" v-memo="[row.text, picked.has(row.image)]"
+            :class="{ picked: picked.has(row.image) }" @click="toggle(row.image)">
+            <td class="box" @click.stop>
+              <input type="checkbox" :aria-label="row.image" :checked="picked.has(row.image)" @change="toggle(row.image)" />
+            </td>
+            <td v-for="column in columns" :key="column.name" :class="column.align" :data-column="column.name">
+              <template v-if="column.name === 'picture'">
+                <img v-if="row.picture" class="thumbnail" loading="lazy" :src="row.picture" alt="" />
+                <div v-else class="thumbnail"></div>
+              </template>
+              <a v-else-if="column.name === 'image'" class="name" href="#" role="button"
+                @click.stop.prevent="$emit('look', row.image)">{{ row.image }}</a>
+              <template v-else>{{ row[column.name] }}</template>
+            </td>
+          </tr>
+        </tbody>
+      </table>
+    </div>`,
+  props: { columns: Array, rows: String, selected: Array },
   emits: ["select", "look"],
   data() {
-    return { names: this.selected, all: { rowsPerPage: 0 } };
+    return { picked: new Set(this.selected), by: "", descending: false };
   },
   watch: {
     selected(names) {
-      this.names = names;
+      this.picked = new Set(names);
     },
   },
   computed: {
-    picked() {
-      const names = new Set(this.names);
-      return this.rows.filter((row) => names.has(row.image));
+    parsed() {
+      return JSON.parse(this.rows).map((row) => Object.freeze({ ...row, text: JSON.stringify(row) }));
+    },
+    sorted() {
+      if (!this.by) return this.parsed;
+      const { compare } = new Intl.Collator(undefined, { numeric: true });
+      const value = (row) => String(row[this.by] ?? "");
+      const rows = [...this.parsed].sort((a, b) => compare(value(a), value(b)));
+      return this.descending ? rows.reverse() : rows;
+    },
+    some() {
+      return this.picked.size > 0;
+    },
+    all() {
+      return this.some && this.picked.size === this.parsed.length;
     },
   },
   methods: {
-    pick(rows) {
-      this.names = rows.map((row) => row.image);
-      this.$emit("select", this.names);
+    order(column) {
+      if (!column.sortable) return undefined;
+      return this.by !== column.name ? "none" : this.descending ? "descending" : "ascending";
     },
-    toggle(_, row) {
-      this.pick(this.picked.includes(row) ? this.picked.filter((one) => one !== row) : [...this.picked, row]);
+    sort(name) {
+      if (this.by !== name) [this.by, this.descending] = [name, false];
+      else if (!this.descending) this.descending = true;
+      else this.by = ""; // in order of capture again
+    },
+    pick(names) {
+      this.picked = new Set(names);
+      this.$emit("select", [...names]);
+    },
+    pickAll() {
+      this.pick(this.all ? [] : this.parsed.map((row) => row.image));
+    },
+    toggle(image) {
+      this.pick(this.picked.has(image) ? [...this.picked].filter((one) => one !== image) : [...this.picked, image]);
     },
   },
 };

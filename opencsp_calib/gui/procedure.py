@@ -48,7 +48,7 @@ def put_back(session: Session, names: Iterable[str]) -> None:
 
 async def _find_corners(session: Session) -> None:
     asked, target = session.asked(), session.file("observations")
-    session.views = {}
+    session.views, session.looking = {}, True
     try:
         await session.job(
             "find_corners",
@@ -57,10 +57,12 @@ async def _find_corners(session: Session) -> None:
             options=session.settings.finding,
             observations=str(target),
             journal=str(session.file("found", "journal")),
+            thumbnails=str(session.thumbnails.folder),
         )
         found = await asyncio.to_thread(load_observations, target)
         session.observations, session.found_with = found, asked
     finally:
+        session.looking = False
         session.views = await asyncio.to_thread(described, session.observations)
     session.removed &= {view.image for view in found.views}
     text = f"The board is found in {len(found.used)} of {len(found.views)} photographs."

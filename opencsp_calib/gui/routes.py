@@ -1,7 +1,7 @@
 """What goes to and from the browser beside the page itself: photographs in, thumbnails, photographs and results out."""
 
 import asyncio
-import hashlib
+import filecmp
 import os
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -12,12 +12,13 @@ from fastapi.responses import FileResponse
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.files import file_name, within
 from opencsp_calib.gui.session import Session
+from opencsp_calib.gui.thumbnails import THUMBNAIL_PX
 from opencsp_calib.images import MAX_BYTES, ImageFile, encode_thumbnail, read_image
 
 __all__ = ["WHOLE_PX", "routes"]
 
-THUMBNAIL_PX = 320
 WHOLE_PX = 100_000
+PIECE = 2**20  # bytes of an upload that are written at once
 
 
 def routes(session: Session) -> APIRouter:
@@ -56,12 +57,15 @@ def _outgoing(router: APIRouter, session: Session) -> None:
 
     @router.get("/photographs")
     async def give(image: str, side: int = THUMBNAIL_PX) -> Response:
-        path = session.selection.path_of(image)
+        path = session.selection.paths.get(image)
         if path is None:
             raise HTTPException(404)
-        async with whole if side > THUMBNAIL_PX else small:
+        make = session.thumbnails.of if side <= THUMBNAIL_PX else _whole
+        async with small if side <= THUMBNAIL_PX else whole:
+            if side <= THUMBNAIL_PX and session.looking and image not in session.views:
+                return Response(status_code=204)  # it is made where the board is looked for, and asked for then
             try:
-                data = await asyncio.to_thread(_picture, path, side, session.own / "thumbnails")
+                data = await asyncio.to_thread(make, path)
             except (CalibError, OSError) as error:
                 raise HTTPException(404, str(error)) from None
         return Response(data, media_type="image/jpeg", headers={"cache-control": "private, max-age=60"})
@@ -82,18 +86,21 @@ async def _saved(chunks: AsyncIterator[bytes], folder: Path, name: str) -> str:
     folder.mkdir(parents=True, exist_ok=True)
     target = folder / name
     part = folder.parent / f".receiving-{os.urandom(8).hex()}"
-    digest, size = hashlib.sha256(), 0
+    size, piece = 0, bytearray()
     try:
         with part.open("wb") as file:
             async for chunk in chunks:
                 size += len(chunk)
                 if size > MAX_BYTES:
                     raise InputError(f"it is larger than {MAX_BYTES >> 30} GiB")
-                digest.update(chunk)
-                await asyncio.to_thread(file.write, chunk)
+                piece += chunk
+                if len(piece) >= PIECE:
+                    await asyncio.to_thread(file.write, piece)
+                    piece = bytearray()
+            await asyncio.to_thread(file.write, piece)
         number = 1
         while target.exists():
-            if hashlib.sha256(target.read_bytes()).digest() == digest.digest():
+            if await asyncio.to_thread(filecmp.cmp, part, target, shallow=False):
                 return target.name
             number += 1
             target = folder / f"{Path(name).stem} ({number}){Path(name).suffix}"
@@ -103,18 +110,6 @@ async def _saved(chunks: AsyncIterator[bytes], folder: Path, name: str) -> str:
     return target.name
 
 
-def _picture(path: Path, side: int, cache: Path) -> bytes:
-    """A photograph as the browser can show it, small or whole; small ones are kept."""
-    if side > THUMBNAIL_PX:
-        return encode_thumbnail(read_image(ImageFile(path.name, path)).pixels, WHOLE_PX)
-    stat = path.stat()
-    key = hashlib.sha256(f"{path} {stat.st_mtime_ns} {stat.st_size}".encode()).hexdigest()[:32]
-    kept = cache / f"{key}.jpg"
-    if kept.is_file():
-        return kept.read_bytes()
-    data = encode_thumbnail(read_image(ImageFile(path.name, path)).pixels, THUMBNAIL_PX)
-    cache.mkdir(parents=True, exist_ok=True)
-    part = kept.with_suffix(f".{os.urandom(4).hex()}")
-    part.write_bytes(data)
-    part.replace(kept)
-    return data
+def _whole(path: Path) -> bytes:
+    """A photograph as the browser can show it."""
+    return encode_thumbnail(read_image(ImageFile(path.name, path)).pixels, WHOLE_PX)

@@ -1,6 +1,7 @@
 """Step 5: saving the camera, to a place below DIR and as a download: HDF5, the report, or another program's format."""
 
 import asyncio
+import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -9,7 +10,7 @@ from urllib.parse import quote
 
 from nicegui import ui
 
-from opencsp_calib.atomic import check_writable
+from opencsp_calib.atomic import check_writable, replacing
 from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
@@ -17,7 +18,6 @@ from opencsp_calib.gui.controls import action, choice, field, offer, set_prop
 from opencsp_calib.gui.files import file_name, shown, within
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.session import Session
-from opencsp_calib.hdf5_calibration import save_calibration
 from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ async def _save(session: Session, kind: str, path: Path) -> None:
     if calibration is None:
         raise InputError("calibrate first")
     if kind == HDF5:
-        await asyncio.to_thread(save_calibration, calibration, path)
+        await asyncio.to_thread(_copy, session.file("calibration"), path)  # the very bytes that the worker wrote
     elif kind == REPORT:
         kept, before = session.file("calibration"), session.file("before") if session.before else ""
         await session.job("report", calibration=str(kept), before=str(before), target=str(path))
@@ -82,3 +82,8 @@ async def _save(session: Session, kind: str, path: Path) -> None:
         await asyncio.to_thread(write_camera_file, calibration.camera, path, kind)
     what = "Report" if kind == REPORT else "Camera"
     session.message = Message(f"{what} saved: {shown(session.folder, path)}", "good")
+
+
+def _copy(kept: Path, path: Path) -> None:
+    with replacing(path) as temporary:
+        shutil.copyfile(kept, temporary)

@@ -25,6 +25,7 @@ class Selection:
         self.folder, self.uploads = folder, uploads
         self.sources: tuple[str, ...] = ()
         self.files: tuple[ImageFile, ...] = ()
+        self.paths: dict[str, Path] = {}  # by what a photograph is called
         self.receiving: dict[str, tuple[int, int]] = {}  # batches: how many have come, how many there will be
 
     def add(self, text: str) -> tuple[str, int]:
@@ -77,12 +78,9 @@ class Selection:
         self.sources = tuple(kept)
         paths = list(dict.fromkeys(path.resolve() for path in paths))
         self.files = find_images(paths) if paths else ()
+        self.paths = {file.name: file.path for file in self.files}
         return tuple(wrong)
-
-    def path_of(self, image: str) -> Path | None:
-        """Where a photograph is."""
-        return next((file.path for file in self.files if file.name == image), None)
 
     def provenance(self) -> dict[str, dict[str, str]]:
         """Where all of them are, as `pipeline.places_of`."""
-        return {"images": {file.name: str(file.path.absolute()) for file in self.files}}
+        return {"images": {name: str(path.absolute()) for name, path in self.paths.items()}}

@@ -35,6 +35,7 @@ from opencsp_calib.gui.news import Level, Message, Progress
 from opencsp_calib.gui.offered import Offered
 from opencsp_calib.gui.selection import Selection
 from opencsp_calib.gui.settings import Settings
+from opencsp_calib.gui.thumbnails import Thumbnails
 from opencsp_calib.gui.work import Worker
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 from opencsp_calib.initial import rough_tilts
@@ -65,8 +66,10 @@ class Session:
         self.offered: Offered | None = None
         self.settings = Settings()
         self.selection = Selection(self.folder, self.own / "photographs")
+        self.thumbnails = Thumbnails(self.own / "thumbnails")
         self.kept = ""  # the file that corners were taken up from, in the place of photographs
         self.views: dict[str, dict[str, Any]] = {}  # by image, as `summary.view_as_json`
+        self.looking = False  # whether the board is being looked for: views come in
         self.found_with: list[Any] = []
         self.observations: Observations | None = None
         self.removed: frozenset[str] = frozenset()

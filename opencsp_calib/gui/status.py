@@ -28,7 +28,7 @@ def build(page: "Page") -> Callable[[], None]:
         line.classes(replace=f"status {session.message.level if not progress else 'info'}")
         work.set_visibility(progress is not None)
         if progress:
-            bar.props["indeterminate"] = progress.total == 0
+            bar.classes(replace="" if progress.total else "waiting")
             bar.set_value(progress.done / progress.total if progress.total else 0.0)
 
     return refresh

@@ -15,21 +15,15 @@ if TYPE_CHECKING:
 __all__ = ["build"]
 
 COLUMNS: list[dict[str, Any]] = [
-    {"name": "picture", "label": "", "field": "picture", "align": "left"},
-    {"name": "image", "label": "Photograph", "field": "image", "align": "left", "sortable": True},
-    {"name": "status", "label": "Status", "field": "status", "align": "left", "sortable": True},
-    {"name": "corners", "label": "Corners", "field": "corners", "sortable": True},
-    {"name": "tilt", "label": "Tilt (°)", "field": "tilt", "sortable": True},
-    {"name": "edge", "label": "Edges (px)", "field": "edge", "sortable": True},
-    {"name": "rms", "label": "rms (px)", "field": "rms", "sortable": True},
-    {"name": "problems", "label": "To know", "field": "problems", "align": "left", "classes": "wide"},
+    {"name": "picture", "label": "", "align": "left"},
+    {"name": "image", "label": "Photograph", "align": "left", "sortable": True},
+    {"name": "status", "label": "Status", "align": "left", "sortable": True},
+    {"name": "corners", "label": "Corners", "sortable": True},
+    {"name": "tilt", "label": "Tilt (°)", "sortable": True},
+    {"name": "edge", "label": "Edges (px)", "sortable": True},
+    {"name": "rms", "label": "rms (px)", "sortable": True},
+    {"name": "problems", "label": "To know", "align": "left"},
 ]
-IN_SIGHT = (
-    "virtual-scroll virtual-scroll-item-size=53 "  # the height of a row in px
-    "virtual-scroll-slice-ratio-before=0.5 virtual-scroll-slice-ratio-after=0.5"
-)
-"""Draws the rows that can be seen, and half as many before and after them: each costs time whenever one changes."""
-
 START = (
     "Describe the board on the left and select about 50 photographs of it: tilted by 30 to 45 degrees to every side, "
     "half of them with the board turned by 90 degrees, together filling the whole image. Each photograph is listed "
@@ -40,7 +34,7 @@ START = (
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    table = PhotographTable(page, COLUMNS).props(f"{IN_SIGHT} data-testid=images").classes("views")
+    table = PhotographTable(page, COLUMNS).props("data-testid=images").classes("views")
     empty = ui.label(START).classes("quiet empty")
 
     def refresh() -> None:
@@ -68,12 +62,12 @@ def _dropped(session: Session) -> dict[str, str]:
 
 
 def _row(session: Session, image: str, rms: dict[str, float], dropped: dict[str, str]) -> dict[str, Any]:
-    view, place = session.views.get(image, {}), str(session.selection.path_of(image))
+    view, place = session.views.get(image, {}), str(session.selection.paths.get(image, image))
     told = [problem["message"] for problem in view.get("problems", ())]
     told += [dropped[image]] if image in dropped else []
     return {
         "image": image,
-        "picture": f"photographs?image={quote(image)}",
+        "picture": _picture(session, image, view.get("status")),
         "status": "left out" if image in session.removed or image in dropped else view.get("status", ""),
         "corners": view.get("corners"),
         "tilt": _rounded(view.get("tilt_deg"), 0),
@@ -81,6 +75,14 @@ def _row(session: Session, image: str, rms: dict[str, float], dropped: dict[str,
         "rms": _rounded(rms.get(image), 4),
         "problems": "; ".join(told).replace(place, image),
     }
+
+
+def _picture(session: Session, image: str, status: str | None) -> str | None:
+    """The address of its thumbnail; while the board is looked for, of those that this has made."""
+    if image not in session.selection.paths or status == "unreadable" or (session.looking and not status):
+        return None
+    # once looked at, another address: the first may have been asked for while it was not to be had
+    return f"photographs?image={quote(image)}{'&seen' if status else ''}"
 
 
 def _rounded(value: float | None, digits: int) -> str | None:
