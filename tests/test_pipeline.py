@@ -210,6 +210,13 @@ def test_no_more_images_are_in_memory_than_are_looked_at(photographs: Path) -> N
     assert detector.most <= 3  # one each, and one that is being handed over
 
 
+def test_a_detector_of_ones_own_needs_no_plugin(photographs: Path) -> None:
+    detector = Counting()
+    found = detect(photographs, Checkerboard(9, 6, 0.03), detector=detector)
+    assert detector.looked == len(found.views) == 12
+    assert {view.status for view in found.views} == {"no board"}
+
+
 def test_a_solver_that_cannot_hold_the_pixel_aspect_is_not_made_to() -> None:
     """All views the same way up: square pixels would be assumed, which COLMAP cannot; then the aspect stays open."""
     pytest.importorskip("pycolmap")

@@ -32,6 +32,8 @@ def test_wrong_images_say_why(window: Window, photographs: Path, tmp_path: Path)
     assert table["grey.png"][-1]
     assert table["small.png"][2] in ("wrong size", "no board")
     assert table["01.png"][2:4] == ["used", "54"]
+    pictures = "return [...document.querySelectorAll('[data-testid=images] img')].map((img) => img.naturalWidth > 0)"
+    window.until(lambda: window.browser.execute_script(pictures) == [True] * 6)  # of all that are images
     window.picture("wrong-images")
     window.click("view-corners")
     window.until(lambda: window.element("viewed").text.startswith("01.png"))
@@ -86,6 +88,10 @@ def test_reload_in_the_middle_and_a_second_tab_lose_nothing(small: Window) -> No
     small.until(lambda: small.enabled("calibrate"))
     rms = small.calibrate()
     small.type("camera-name", "renamed")
+    browser.find_element("css selector", "[aria-label^=Colours]").click()
+    browser.refresh()
+    small.until(lambda: small.find_all("[aria-label='Colours: dark']") and small.find_all(".body--dark"))
+    browser.execute_script("localStorage.clear()")
     second = browser.current_window_handle
     browser.switch_to.window(first)
     small.until(lambda: small.rms == f"{rms:.4f} px")
