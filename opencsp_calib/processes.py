@@ -3,11 +3,9 @@
 import os
 import subprocess
 import sys
-from contextlib import suppress
-from pathlib import Path
 from typing import IO, Any
 
-__all__ = ["BACKGROUND", "answers", "own_process", "step_back"]
+__all__ = ["BACKGROUND", "answers", "own_process"]
 
 BACKGROUND: dict[str, Any] = {"creationflags": getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)}
 """What Windows wants to be told, beside the command, where a process is started that runs in the background."""
@@ -23,30 +21,18 @@ def own_process(module: str, *, background: bool = False) -> list[str]:
     ----------
     module : str
     background : bool
-        Whether it leaves the processor to what people look at; on Windows `BACKGROUND` does that.
+        Whether it leaves the processor to what people look at; on Windows `BACKGROUND` does that. Here before anything
+        is imported, because on Linux a library's threads keep the priority that they were started with.
     """
     steps = [
         "import os, signal, sys",
         "signal.signal(signal.SIGINT, signal.SIG_IGN)",
+        "hasattr(os, 'nice') and os.nice(10)" if background else "",
         "sys.path[:] = filter(None, sys.path)",
-        "from opencsp_calib.processes import step_back; step_back()" if background else "",
         f"from {module} import main",
         "main()",
     ]
     return [sys.executable, "-c", "; ".join(filter(None, steps))]
-
-
-def step_back() -> None:
-    """Leave the processor to others that want it; to be called before threads are started, which keep what they have.
-
-    Linux shares the processor between sessions first, and weighs the processes of each among themselves only: to step
-    back behind a browser, which is another session, a process needs one of its own, with that session's weight.
-    """
-    if sys.platform != "win32":
-        os.nice(10)
-        with suppress(OSError):
-            os.setsid()
-            Path("/proc/self/autogroup").write_text("10", encoding="ascii")
 
 
 def answers(mode: str) -> IO[Any]:
