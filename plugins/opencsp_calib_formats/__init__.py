@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from opencsp_calib import hookimpl
 from opencsp_calib.interfaces import CameraFormat
 
+__all__ = ["camera_formats"]
+
 
 @hookimpl
 def camera_formats() -> Iterator[CameraFormat]:

@@ -19,15 +19,13 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.large_json import IN_PART, read_json
 from opencsp_calib_formats.lens import fov, on_plane
-from opencsp_calib_formats.other_camera import each_camera, other_camera
+from opencsp_calib_formats.other_camera import Intrinsics, Size, each_camera, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, not_a_result, unverified
 from opencsp_calib_formats.safe_text import MAX_BYTES, head
 
 __all__ = ["AliceVision"]
 
 Version = tuple[int, ...]
-Size = tuple[int, int]
-Intrinsics = tuple[float, float, float, float]
 
 DISTORTION_OF_TYPE = {
     "pinhole": "none",

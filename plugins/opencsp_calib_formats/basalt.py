@@ -1,6 +1,7 @@
 """Basalt's calibration: a list of cameras with named parameters.
 
-Source: basalt-headers, ``camera/*.hpp`` (formulas) and ``serialization/headers_serialization.h`` (layout).
+The centre of the upper-left pixel is taken to be (0, 0), as OpenCV's. Source: basalt-headers, ``camera/*.hpp``
+(formulas) and ``serialization/headers_serialization.h`` (layout).
 """
 
 from collections.abc import Callable, Mapping

@@ -19,7 +19,7 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, equidistant, omni, on_plane
-from opencsp_calib_formats.other_camera import other_camera
+from opencsp_calib_formats.other_camera import Intrinsics, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, unverified
 from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
 
@@ -63,9 +63,9 @@ class BoofCV(FileFormat):
 
 @dataclass(frozen=True)
 class _Pinhole:
-    """Focal lengths and centre in our convention, skew, image size."""
+    """Intrinsics in our convention, skew in pixels, image size."""
 
-    intrinsics: tuple[float, float, float, float]
+    intrinsics: Intrinsics
     skew: float
     size: tuple[int, int]
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.interfaces import Imported
-from opencsp_calib_formats.fields import Fields
+from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.mat_file import is_mat, read_mat
 from opencsp_calib_formats.opencv_camera import either_model, opencv_camera
 from opencsp_calib_formats.reading import FileFormat, naming
@@ -101,7 +101,5 @@ def _cameras(stem: str, key: str, end: str, fields: Fields, *, fisheye: bool) ->
 def _image_size(fields: Fields) -> tuple[int, int] | None:
     if "nx" not in fields or "ny" not in fields:
         return None
-    nx, ny = (fields.numbers(side, 1)[0] for side in ("nx", "ny"))
-    if nx != int(nx) or ny != int(ny):
-        raise FileFormatError(f"nx, ny = {nx:g}, {ny:g} is no image size")
-    return int(nx), int(ny)
+    nx, ny = (whole(fields.numbers(side, 1)[0], side) for side in ("nx", "ny"))
+    return nx, ny

@@ -18,7 +18,7 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import not_exactly
 from opencsp_calib.interfaces import Imported
-from opencsp_calib_formats.fields import Fields, whole
+from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.mrcal_models import imported
 from opencsp_calib_formats.reading import FileFormat, naming
 from opencsp_calib_formats.safe_text import head, read_text
@@ -48,8 +48,7 @@ class Cahvor(FileFormat):
         """See `CameraFormat.read`."""
         with naming(path):
             fields = Fields(_values(read_text(path)))
-            width, height = (whole(side, "Dimensions") for side in fields.numbers("Dimensions", 2))
-            return {"camera": _imported(path.stem, fields, (width, height))}
+            return {"camera": _imported(path.stem, fields, fields.size_pair("Dimensions"))}
 
 
 def _values(text: str) -> dict[str, str]:

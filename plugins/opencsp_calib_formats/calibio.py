@@ -1,7 +1,8 @@
 """calib.io's Calibrator: the cameras of a project or an exported calibration.
 
-A dump of C++ objects by cereal: the name of a class stands only where it is first met, later there is its number.
-fx = f, fy = f ar; the coefficients are OpenCV's, by name. Source: calib.io, ``readCalibParameters.cpp``.
+A dump of C++ objects by cereal: the name of a class stands only where it is first met, later there is its number. fx =
+f, fy = f ar; the coefficients are OpenCV's, by name. The centre of the upper-left pixel is taken to be (0, 0), as
+OpenCV's. Source: calib.io, ``readCalibParameters.cpp``.
 """
 
 from collections.abc import Mapping
@@ -16,7 +17,7 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.other_camera import each_camera
-from opencsp_calib_formats.reading import FileFormat, naming
+from opencsp_calib_formats.reading import FileFormat, naming, unverified
 from opencsp_calib_formats.safe_text import MAX_BYTES, head, parse_json, read_text
 
 __all__ = ["CalibIo", "class_names"]
@@ -25,6 +26,11 @@ COEFFICIENTS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3"
 OPENCV = "libCalib::CameraModelOpenCV"
 FIRST = 1 << 31  # of a polymorphic_id: the class's name stands beside it
 ROOTS = ("Calibration", "calibration")
+
+HALF_PIXEL = unverified(
+    "calib.io does not document where its pixels' origin is; OpenCV's is taken: if it is the image's corner, cx and cy "
+    "are 0.5 px too large"
+)
 
 
 class CalibIo(FileFormat):
@@ -74,7 +80,7 @@ def _imported(name: str, model: Fields, kind: str) -> Imported:
     d = np.array([_value(parameters, key, 0.0) for key in COEFFICIENTS])
     count = next(n for n in OPENCV_MODELS if not d[n:].any())
     params = np.array([f, f * ar, cx, cy, *d[:count]])
-    return as_imported(name, OPENCV_MODELS[count], params, size)
+    return as_imported(name, OPENCV_MODELS[count], params, size, (HALF_PIXEL,))
 
 
 def _value(parameters: Fields, key: str, default: float | None = None) -> float:

@@ -1,8 +1,8 @@
 """camodocal and those who use its cameras: VINS-Mono, VINS-Fusion and many more (YAML with ``model_type``).
 
 PINHOLE is OpenCV's model with four coefficients; KANNALA_BRANDT's k2 to k5 are OpenCV's fisheye k1 to k4; MEI is the
-unified omnidirectional model with radial and tangential terms; SCARAMUZZA is ``ocam``. Source: camodocal,
-``camera_models/*Camera.cc``.
+unified omnidirectional model with radial and tangential terms; SCARAMUZZA is ``ocam``. The centre of the upper-left
+pixel is taken to be (0, 0), as OpenCV's. Source: camodocal, ``camera_models/*Camera.cc``.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,13 +16,12 @@ from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, ocam, omni
-from opencsp_calib_formats.other_camera import other_camera
+from opencsp_calib_formats.other_camera import Size, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming
 from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
 
 __all__ = ["Camodocal"]
 
-Size = tuple[int, int]
 RADTAN = ("k1", "k2", "p1", "p2")
 
 

@@ -21,7 +21,7 @@ from opencsp_calib.arrays import Floats, Points
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported
 from opencsp_calib.interfaces import Imported
-from opencsp_calib_formats.fields import Fields, whole
+from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, double_sphere, eucm, fov, omni, on_plane
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import other_camera
@@ -105,14 +105,14 @@ def _imported(name: str, fields: Fields) -> Imported:
     shape_names = SHAPE[model]
     intrinsics = [float(value) for value in fields.numbers("intrinsics", len(shape_names) + 4)]
     coefficients = [float(value) for value in _coefficients(fields, COEFFICIENTS[distortion])]
-    width, height = (whole(side, fields.path("resolution")) for side in fields.numbers("resolution", 2))
+    size = fields.size_pair("resolution")
     shape = dict(zip(shape_names, intrinsics, strict=False))
     fx, fy, cx, cy = intrinsics[len(shape_names) :]
     if distortion == "fov" and coefficients[0] == 0:
         distortion, coefficients = "none", []
     if _is_perspective(model, shape) and distortion != "fov":
         ours = {"none": "pinhole", "radtan": "opencv4", "equidistant": "opencv_fisheye"}[distortion]
-        return as_imported(name, ours, np.array([fx, fy, cx, cy, *coefficients]), (width, height))
+        return as_imported(name, ours, np.array([fx, fy, cx, cy, *coefficients]), size)
     _check_shape(model, shape, fields)
     if distortion == "fov" and not abs(coefficients[0]) < np.pi:
         raise FileFormatError(f"{fields.path('distortion_coeffs')}: w = {coefficients[0]:g} is no angle below pi")
@@ -120,7 +120,7 @@ def _imported(name: str, fields: Fields) -> Imported:
     if distortion == "fov":
         obstacles = (f"w = {coefficients[0]:g} (fov distortion)",)
     plane = _plane(model, shape, distortion, coefficients)
-    return other_camera(name, obstacles, plane, (fx, fy, cx, cy), (width, height))
+    return other_camera(name, obstacles, plane, (fx, fy, cx, cy), size)
 
 
 def _coefficients(fields: Fields, count: int) -> Any:

@@ -31,7 +31,8 @@ from opencsp_calib_formats.scaramuzza import scaramuzza
 
 __all__ = ["Matlab"]
 
-KINDS = ("RadialDistortion", "DistortionCoefficients", "MappingCoefficients")
+MAPPING = "MappingCoefficients"
+KINDS = ("RadialDistortion", "DistortionCoefficients", MAPPING)
 MATRICES = ("K", "IntrinsicMatrix")
 ORIGIN = 1.0
 MAX_DEPTH = 12
@@ -75,7 +76,7 @@ def _cameras(value: Any, key: str, depth: int) -> Iterator[tuple[str, Fields]]:
     if depth > MAX_DEPTH:
         return
     if isinstance(value, Mapping):
-        if any(kind in value for kind in KINDS) and any(m in value for m in (*MATRICES, "FocalLength", KINDS[2])):
+        if any(kind in value for kind in KINDS) and any(m in value for m in (*MATRICES, "FocalLength", MAPPING)):
             yield key or "camera", Fields(value, key)
             return
         items: Any = value.items()
@@ -132,7 +133,7 @@ def _named(cameras: Mapping[str, Fields], content: Any) -> dict[str, Fields]:
 
 def _imported(name: str, fields: Fields) -> Imported:
     size = _image_size(fields)
-    if "MappingCoefficients" in fields:
+    if MAPPING in fields:
         return _scaramuzza(name, fields, size)
     camera_matrix = _matrix(fields)
     camera_matrix[:2, 2] -= ORIGIN
@@ -172,7 +173,7 @@ def _matrix(fields: Fields) -> Floats:
 
 
 def _scaramuzza(name: str, fields: Fields, size: tuple[int, int] | None) -> Imported:
-    mapping = fields.numbers("MappingCoefficients", 4)
+    mapping = fields.numbers(MAPPING, 4)
     centre = fields.numbers("DistortionCenter", 2) - ORIGIN
     stretch = fields.matrix("StretchMatrix", 2, 2) if "StretchMatrix" in fields else np.eye(2)
     Camera(name, "pinhole", np.array([mapping[0], mapping[0], *centre]), size or (1, 1))  # a0 is its focal length

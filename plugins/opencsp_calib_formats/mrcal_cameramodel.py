@@ -16,7 +16,7 @@ from pathlib import Path
 
 from opencsp_calib import Camera
 from opencsp_calib.interfaces import Imported
-from opencsp_calib_formats.fields import Fields, whole
+from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.mrcal_models import imported
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.python_literal import parse_literal
@@ -51,8 +51,8 @@ class MrcalCameraModel(TextFormat):
         with naming(path):
             fields = Fields(parse_literal(read_text(path)))
             lensmodel = fields.text(fields.first(*MODEL_KEYS) or MODEL_KEYS[0])
-            width, height = (whole(side, "imagersize") for side in fields.numbers("imagersize", 2))
-            return {"camera": imported(path.stem, lensmodel, fields.numbers("intrinsics"), (width, height))}
+            size = fields.size_pair("imagersize")
+            return {"camera": imported(path.stem, lensmodel, fields.numbers("intrinsics"), size)}
 
     def text(self, cameras: Mapping[str, Camera], path: Path, notes: Mapping[str, str]) -> str:
         """See `TextFormat.text`."""

@@ -18,14 +18,11 @@ from opencsp_calib.importing import as_imported
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import number
 from opencsp_calib_formats.lens import INVERSE, inverse_brown, on_plane
-from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
+from opencsp_calib_formats.other_camera import Intrinsics, Size, each_camera, needing_size, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming, unverified
 from opencsp_calib_formats.safe_text import MAX_BYTES, head
 
 __all__ = ["Nvm"]
-
-Size = tuple[int, int]
-Centred = tuple[float, float, float, float]
 
 NUMBERS = {"NVM_V3": 10, "NVM_V3_R9T": 15}
 """How many numbers follow a photograph's name: f, q, c, r, 0; or f, R, t, r, 0."""
@@ -72,7 +69,7 @@ def _photograph(line: str, count: int) -> tuple[str, tuple[float, float]]:
     return name, (number(numbers[0], f"{name}: focal length"), number(numbers[-2], f"{name}: radial distortion"))
 
 
-def _fixed(words: list[str]) -> Centred | None:
+def _fixed(words: list[str]) -> Intrinsics | None:
     """fx, fy, cx, cy of a header ``FixedK fx cx fy cy``."""
     if not words or words[0] not in ("FixedK", "FixedCalibration"):
         return None
@@ -82,7 +79,7 @@ def _fixed(words: list[str]) -> Centred | None:
     return fx, fy, cx, cy
 
 
-def _imported(name: str, f: float, r: float, fixed: Centred | None) -> Imported:
+def _imported(name: str, f: float, r: float, fixed: Intrinsics | None) -> Imported:
     if fixed is not None:
         return _of_intrinsics(name, fixed, r, None)
 
@@ -92,7 +89,7 @@ def _imported(name: str, f: float, r: float, fixed: Centred | None) -> Imported:
     return needing_size(None, of_size)
 
 
-def _of_intrinsics(name: str, intrinsics: Centred, r: float, size: Size | None) -> Imported:
+def _of_intrinsics(name: str, intrinsics: Intrinsics, r: float, size: Size | None) -> Imported:
     if r == 0:
         return as_imported(name, "pinhole", np.array(intrinsics), size, (CENTRE,))
     obstacle = f"r = {r:g} ({INVERSE})"

@@ -1,7 +1,8 @@
 """openMVG's ``sfm_data.json``: intrinsics dumped by cereal.
 
 ``disto_k1`` and ``disto_k3`` are OpenCV's k1 [k2 k3], ``disto_t2`` k1 k2 k3 and p1 p2, ``fisheye`` OpenCV's fisheye k1
-to k4. Source: openMVG, ``cameras/Camera_*_io.hpp`` and ``Camera_Pinhole_*.hpp``.
+to k4. The centre of the upper-left pixel is taken to be (0, 0), which is not documented. Source: openMVG,
+``cameras/Camera_*_io.hpp`` and ``Camera_Pinhole_*.hpp``.
 """
 
 from collections.abc import Mapping

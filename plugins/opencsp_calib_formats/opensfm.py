@@ -21,13 +21,11 @@ from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.large_json import IN_PART, read_json
 from opencsp_calib_formats.lens import brown, equidistant
 from opencsp_calib_formats.opencv_camera import carried
-from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
+from opencsp_calib_formats.other_camera import Size, each_camera, needing_size, other_camera
 from opencsp_calib_formats.reading import TextFormat, naming, not_a_result
 from opencsp_calib_formats.safe_text import MAX_BYTES, head
 
 __all__ = ["OpenSfM"]
-
-Size = tuple[int, int]
 
 EXACT = {
     "perspective": ("opencv4", ("k1", "k2")),

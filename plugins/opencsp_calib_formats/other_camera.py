@@ -1,8 +1,8 @@
-"""Imports that are none of our lens models, or that wait for an image size which the file does not have."""
+"""Imports that `as_imported` does not do: no lens model of ours, no image size in the file, many cameras in it."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 
@@ -13,10 +13,13 @@ from opencsp_calib.importing import not_exactly
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.lens import to_pixels
 
-__all__ = ["each_camera", "needing_size", "other_camera"]
+__all__ = ["Intrinsics", "Size", "each_camera", "needing_size", "other_camera"]
 
 T = TypeVar("T")
-Size = tuple[int, int]
+Size: TypeAlias = tuple[int, int]
+"""Width and height, pixels."""
+Intrinsics: TypeAlias = tuple[float, float, float, float]
+"""fx, fy, cx, cy, pixels; the centre of the upper-left pixel is (0, 0)."""
 MAX_CAMERAS = 20_000
 
 
@@ -24,7 +27,7 @@ def other_camera(
     name: str,
     obstacles: tuple[str, ...],
     plane: Callable[[Points], Floats],
-    intrinsics: tuple[float, float, float, float],
+    intrinsics: Intrinsics,
     image_size: Size | None,
     notes: tuple[Problem, ...] = (),
     *,

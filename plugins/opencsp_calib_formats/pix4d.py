@@ -2,7 +2,8 @@
 
 Both carry x_d = (1 + R1 r² + R2 r⁴ + R3 r⁶) x + 2 T1 x y + T2 (r² + 2 x²), OpenCV's formula. The .cam file is in
 millimetres of a sensor whose size is in its header, without the size in pixels; the .txt file in pixels, for each
-photograph. Source: Pix4D support, "How are the internal and external camera parameters defined"; EasyIDP, ``pix4d.py``.
+photograph. Coordinates count from the image's corner, as far as is known: 0.5 is taken off. Source: Pix4D support, "How
+are the internal and external camera parameters defined"; EasyIDP, ``pix4d.py``.
 """
 
 import re

@@ -4,9 +4,10 @@ With L the larger image side, x = X/Z and y = Y/Z distorted by ``brown``::
 
     u = f/36 L x + w/2 + U L,  v = f/36 L y + h/2 + V L
 
-f being FocalLength35mm, U and V the PrincipalPoint. The six coefficients are k1 k2 k3 k4 t1 t2; t1 and t2 are OpenCV's
-p2 and p1, k4 is a term in r⁸. Source: Capturing Reality, "RealityCapture XMP camera math"; the order of t1 and t2 from
-the OpenCV-compliant export that comes with the program. The file does not have the image size.
+from the image's corner, as far as is known: 0.5 is taken off. f is FocalLength35mm, U and V the PrincipalPoint. The six
+coefficients are k1 k2 k3 k4 t1 t2; t1 and t2 are OpenCV's p2 and p1, k4 is a term in r⁸. Source: Capturing Reality,
+"RealityCapture XMP camera math"; the order of t1 and t2 from the OpenCV-compliant export that comes with the program.
+The file does not have the image size.
 """
 
 from collections.abc import Mapping

@@ -21,14 +21,11 @@ from opencsp_calib.models import OPENCV_MODELS
 from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, on_plane
 from opencsp_calib_formats.opencv_camera import carried
-from opencsp_calib_formats.other_camera import each_camera, needing_size, other_camera
+from opencsp_calib_formats.other_camera import Intrinsics, Size, each_camera, needing_size, other_camera
 from opencsp_calib_formats.reading import TextFormat, naming, only_one
 from opencsp_calib_formats.safe_text import head, parse_json, read_text
 
 __all__ = ["TransformsJson"]
-
-Size = tuple[int, int]
-Intrinsics = tuple[float, float, float, float]
 
 FOCAL = ("fl_x", "camera_angle_x", "x_fov")
 TERMS = ("fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2", "camera_model", "is_fisheye")

@@ -1,7 +1,8 @@
 """Pinhole cameras of NASA's Ames Stereo Pipeline (``.tsai``).
 
 fu, fv, cu, cv are in units of ``pitch``; TSAI's coefficients are OpenCV's k1 k2 p1 p2 [k3], FISHEYE's OpenCV's k1 to k4
-and FOV's that of ``fov``. Source: Ames Stereo Pipeline documentation, "Frame camera models". There is no image size.
+and FOV's that of ``fov``. The centre of the upper-left pixel is taken to be (0, 0), which is not documented. Source:
+Ames Stereo Pipeline documentation, "Frame camera models". There is no image size.
 """
 
 from collections.abc import Mapping

@@ -38,6 +38,7 @@ def test_layout_example(data_dir: Path) -> None:
     expected = [1500.25, 1501.75025, 961.5, 538.25, -0.11, 0.09, 0.0004, -0.0002, -0.01]
     np.testing.assert_allclose(camera.params, expected, rtol=1e-12)
     assert camera.image_size == (1920, 1080)
+    assert [note.code for note in imported.notes] == ["unverified-convention"]  # where its pixels' origin is
 
 
 @pytest.mark.parametrize("last", ["p2", "k3", "k6", "s4", "tauY"])
