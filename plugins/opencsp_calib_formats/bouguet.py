@@ -22,7 +22,7 @@ from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.mat_file import is_mat, read_mat
 from opencsp_calib_formats.opencv_camera import either_model, opencv_camera
 from opencsp_calib_formats.reading import FileFormat, naming
-from opencsp_calib_formats.safe_text import Repeated, head, read_text
+from opencsp_calib_formats.safe_text import head, read_text, set_once
 
 __all__ = ["Bouguet"]
 
@@ -80,7 +80,7 @@ def _assigned(text: str) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for match in ASSIGNMENT.finditer(text):
         value = re.split(r"[\s;,]+", match[2].strip("[] \t;,"))
-        values[match[1]] = Repeated() if values.get(match[1], value) != value else value
+        set_once(values, match[1], value)
     return values
 
 

@@ -18,7 +18,8 @@ from opencsp_calib_formats.fields import Fields
 from opencsp_calib_formats.lens import brown, ocam, omni
 from opencsp_calib_formats.other_camera import Size, other_camera
 from opencsp_calib_formats.reading import FileFormat, naming
-from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
+from opencsp_calib_formats.safe_text import head, read_text
+from opencsp_calib_formats.safe_yaml import parse_yaml
 
 __all__ = ["Camodocal"]
 

@@ -25,7 +25,7 @@ class Fields:
     Parameters
     ----------
     values : mapping
-        As `safe_text` gives it; anything else is a FileFormatError.
+        As `safe_text` and `safe_yaml` give it; anything else is a FileFormatError.
     where : str
         What messages put before a field's name: ``cam0``.
     """

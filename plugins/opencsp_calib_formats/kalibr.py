@@ -26,7 +26,8 @@ from opencsp_calib_formats.lens import brown, double_sphere, eucm, fov, omni, on
 from opencsp_calib_formats.opencv_camera import carried
 from opencsp_calib_formats.other_camera import other_camera
 from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one
-from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
+from opencsp_calib_formats.safe_text import head, read_text
+from opencsp_calib_formats.safe_yaml import parse_yaml
 
 __all__ = ["Kalibr"]
 

@@ -23,7 +23,8 @@ from opencsp_calib_formats.fields import Fields, matrix, numbers
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
 from opencsp_calib_formats.opencv_keys import fisheye_of, image_size_of, is_image_size, named_pairs
 from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, xml_comments
-from opencsp_calib_formats.safe_text import Repeated, head, parse_json, parse_xml, parse_yaml, read_bytes, read_text
+from opencsp_calib_formats.safe_text import head, parse_json, parse_xml, read_bytes, read_text, set_once
+from opencsp_calib_formats.safe_yaml import parse_yaml
 
 __all__ = ["OpenCVFileStorage", "is_ros"]
 
@@ -104,7 +105,7 @@ def _of_element(element: Element) -> Any:
         return [_of_element(child) for child in children]
     values: dict[str, Any] = {}
     for child in children:
-        values[child.tag] = Repeated() if child.tag in values else _of_element(child)
+        set_once(values, child.tag, _of_element(child))
     return values
 
 

@@ -1,14 +1,14 @@
 """Python literals out of a stranger's file, without Python's parser: dictionaries, lists, strings, numbers, comments.
 
 `ast.literal_eval` runs no code, but its documentation warns that nesting crashes it; this needs no recursion. Numbers
-stay text, as `safe_text` leaves YAML's.
+stay text, as `safe_yaml` leaves YAML's.
 """
 
 import re
 from typing import Any
 
 from opencsp_calib.errors import FileFormatError
-from opencsp_calib_formats.safe_text import Repeated
+from opencsp_calib_formats.safe_text import set_once
 
 __all__ = ["parse_literal"]
 
@@ -77,8 +77,7 @@ class _Reader:
         if closing != "}":
             items.append(value)
         elif keys:
-            key = keys.pop()
-            items[key] = Repeated() if key in items and items[key] != value else value
+            set_once(items, keys.pop(), value)
         elif isinstance(value, str):
             keys.append(value)
         else:

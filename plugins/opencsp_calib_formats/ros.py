@@ -25,7 +25,8 @@ from opencsp_calib_formats.fields import Fields, matrix, numbers, whole
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
 from opencsp_calib_formats.opencv_filestorage import is_ros
 from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one, unverified
-from opencsp_calib_formats.safe_text import head, parse_yaml, read_text
+from opencsp_calib_formats.safe_text import head, read_text
+from opencsp_calib_formats.safe_yaml import parse_yaml
 
 __all__ = ["RosCameraInfo", "RosIni"]
 

@@ -21,10 +21,10 @@ from opencsp_calib_formats.safe_text import (
     parse_json,
     parse_toml,
     parse_xml,
-    parse_yaml,
     read_bytes,
     read_text,
 )
+from opencsp_calib_formats.safe_yaml import parse_yaml
 
 from opencsp_calib.errors import FileFormatError
 
