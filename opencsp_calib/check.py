@@ -11,7 +11,7 @@ better than the board as given, they are solved with it: a board that is not fla
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -26,11 +26,12 @@ from opencsp_calib.pose_fit import pose_residuals
 from opencsp_calib.projection_sigma import camera_sigma_map, sigma_map
 from opencsp_calib.uncertainty import student_factor, with_uncertainty
 
-__all__ = ["Check", "Judged", "Verdict", "check", "judged", "worse"]
+__all__ = ["Check", "CheckVerdict", "Judged", "check", "judged", "worse"]
 
-Verdict = Literal["ok", "degraded", "wrong"]
+CheckVerdict: TypeAlias = Literal["ok", "degraded", "wrong"]
+"""On a camera, from new photographs of it."""
 
-SEVERITY: tuple[Verdict, ...] = ("ok", "degraded", "wrong")
+SEVERITY: tuple[CheckVerdict, ...] = ("ok", "degraded", "wrong")
 OK_SIGMAS = 2.0
 WRONG_SIGMAS = 5.0
 WRONG_PX = 1.0
@@ -63,7 +64,7 @@ class Judged:
         return OK_SIGMAS * self.predicted_px > WRONG_PX
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> CheckVerdict:
         """``ok``: no farther off than two sigmas; ``wrong``: beyond five, or by more than 1 px; else ``degraded``.
 
         Where the photographs are so few that two sigmas are more than a pixel, a pixel says neither that it is ok nor
@@ -105,7 +106,7 @@ class Check:
         return worse(self.at_range, self.at_infinity)
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> CheckVerdict:
         """The worse of the two; see `Judged.verdict`."""
         return self.decisive.verdict
 

@@ -26,6 +26,12 @@ def write_hdf5(path: str | os.PathLike[str], fill: "Callable[[h5py.File], None]"
 
     A thread of its own fills it: in the main one, Ctrl-C strikes wherever Python runs, also within HDF5's writing.
 
+    Parameters
+    ----------
+    path : path-like
+    fill : callable
+        Writes into the empty file that it is given; what it raises comes through, and no file is left.
+
     Raises
     ------
     InputError

@@ -25,10 +25,12 @@ from opencsp_calib.resampling import known_corners
 from opencsp_calib.trials import LADDER, Trials
 from opencsp_calib.uncertainty import student_factor
 
-__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "SENTENCES", "Pair", "SolverResult", "Validation", "Verdict", "validate"]
+__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "SENTENCES", "Pair", "SolverResult", "Validation", "ValidationVerdict"]
+__all__ += ["validate"]
 
-Verdict: TypeAlias = Literal["agree", "disagree", "not compared"]
-SENTENCES: Mapping[Verdict, str] = {
+ValidationVerdict: TypeAlias = Literal["agree", "disagree", "not compared"]
+"""On a calibration: whether solvers agree on it."""
+SENTENCES: Mapping[ValidationVerdict, str] = {
     "agree": "The solvers agree.",
     "disagree": "The solvers do not agree: do not use this calibration.",
     "not compared": "The solvers were not compared: fewer than two could run.",
@@ -120,7 +122,7 @@ class Validation:
     reasons: tuple[str, ...]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> ValidationVerdict:
         """Of the solvers; fewer than two that could run prove nothing."""
         if not self.pairs:
             return "not compared"

@@ -64,9 +64,10 @@ def compare(
     from opencsp_calib.comparison import compare as compared
 
     if plot:
+        from opencsp_calib.report.figures import figure_format
+
         check_writable(plot)
-        if plot.suffix.lower() not in (".png", ".svg", ".pdf"):
-            raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {plot.name}")
+        figure_format(plot)
     if len(camera or []) > 2:
         raise InputError("compare takes two cameras: give --camera once, or once for A and once for B")
     of_a, of_b = (camera * 2)[:2] if camera else (None, None)

@@ -8,7 +8,7 @@ from nicegui import ui
 from opencsp_calib.errors import InputError
 from opencsp_calib.gui.controls import offer, set_prop
 from opencsp_calib.gui.setting_fields import SettingFields
-from opencsp_calib.gui.settings import BY_FIELDS, Settings
+from opencsp_calib.gui.settings import BY_FIELDS, COUNTED, Settings
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.registry import installed
 
@@ -19,9 +19,7 @@ __all__ = ["build"]
 
 DICTIONARIES = [f"DICT_{size}X{size}_{count}" for size in (4, 5, 6, 7) for count in (50, 100, 250, 1000)]
 DICTIONARIES += ["DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h11"]
-COUNTED = {"charuco": ("Squares x", "Squares y")}
 DEFAULT = {"": "default"}
-GRID_POINTS = ("Grid points x", "Grid points y")
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -31,8 +29,8 @@ def build(page: "Page") -> Callable[[], None]:
         fields.line("camera_name", "Camera name", "camera-name", "camera")
         fields.option("board_kind", "Board", {name: name for name in sorted(installed().boards)})
     with ui.element("div").classes("side-by-side") as grid:
-        across = fields.line("grid_x", GRID_POINTS[0], "grid-x", "18")
-        down = fields.line("grid_y", GRID_POINTS[1], "grid-y", "23")
+        across = fields.line("grid_x", COUNTED["checkerboard"][0], "grid-x", "18")
+        down = fields.line("grid_y", COUNTED["checkerboard"][1], "grid-y", "23")
     square = fields.line("square_mm", "Square size in mm", "square-size", "50")
     with ui.element("div").classes("group") as markers:
         fields.line("marker_mm", "Marker size in mm", hint="40.5")
@@ -58,7 +56,7 @@ def build(page: "Page") -> Callable[[], None]:
         for element, kinds in ((grid, BY_FIELDS), (square, BY_FIELDS), (markers, ("charuco",))):
             element.set_visibility(now.board_kind in kinds)
         described.set_visibility(now.board_kind not in BY_FIELDS)
-        for count, label in zip((across, down), COUNTED.get(now.board_kind, GRID_POINTS), strict=True):
+        for count, label in zip((across, down), COUNTED.get(now.board_kind, COUNTED["checkerboard"]), strict=True):
             set_prop(count, "label", label)
         said.set_text(_said(now))
         said.set_visibility(bool(said.text))

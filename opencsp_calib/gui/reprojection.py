@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 __all__ = ["build"]
 
+FAIR, WORSE, QUIET = "#2b8cb8", "#d2694f", "#7c8890"  # legible on light and on dark
+
 
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
@@ -91,6 +93,3 @@ def _bars(calibration: Calibration) -> dict[str, Any]:
             }
         ],
     }
-
-
-FAIR, WORSE, QUIET = "#2b8cb8", "#d2694f", "#7c8890"  # legible on light and on dark

@@ -12,9 +12,12 @@ from opencsp_calib.registry import installed
 from opencsp_calib.summary import PIXEL_PITCH
 from opencsp_calib.typed import aspect_from, notes_from
 
-__all__ = ["BY_FIELDS", "Settings"]
+__all__ = ["BY_FIELDS", "COUNTED", "Settings"]
 
-BY_FIELDS = ("checkerboard", "charuco")
+COUNTED = {"checkerboard": ("Grid points x", "Grid points y"), "charuco": ("Squares x", "Squares y")}
+"""How the fields of a board's columns and rows are called, which count what its kind counts."""
+
+BY_FIELDS = tuple(COUNTED)
 """Kinds of board that have fields of their own; any other is described in one line."""
 
 
@@ -85,8 +88,7 @@ class Settings:
             If they do not; the message says which field is wrong.
         """
         if self.board_kind in BY_FIELDS:
-            across, down = ("Grid points x", "Grid points y")
-            for text, field in ((self.grid_x, across), (self.grid_y, down)):
+            for text, field in zip((self.grid_x, self.grid_y), COUNTED[self.board_kind], strict=True):
                 if not text.strip().isdecimal():
                     raise BoardSpecError(f"{field} must be a whole number, such as 18, not {text!r}")
             sizes = [(self.square_mm, "Square size")]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-__all__ = ["ACCENT", "COLOURS", "as_image", "colour_bar", "image_axes", "new_figure", "save_figure"]
+__all__ = ["ACCENT", "COLOURS", "as_image", "colour_bar", "figure_format", "image_axes", "new_figure", "save_figure"]
 
 ACCENT = "#0b6e99"
 COLOURS = "viridis"
@@ -75,6 +75,20 @@ def as_image(figure: "Figure", alternative: str) -> str:
     return f'<img class="plot" alt="{html.escape(alternative)}" src="data:image/svg+xml;base64,{data}">'
 
 
+def figure_format(path: str | PathLike[str]) -> str:
+    """What a figure is saved as, by the file's extension: ``png``, ``svg`` or ``pdf``.
+
+    Raises
+    ------
+    InputError
+        If it is another extension.
+    """
+    form = Path(path).suffix.lower().removeprefix(".")
+    if form not in ("png", "svg", "pdf"):
+        raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {Path(path).name}")
+    return form
+
+
 def save_figure(figure: "Figure", path: str | PathLike[str]) -> None:
     """Write a figure as PNG, SVG or PDF, by the extension.
 
@@ -83,8 +97,6 @@ def save_figure(figure: "Figure", path: str | PathLike[str]) -> None:
     InputError
         If it is another extension, or cannot be written.
     """
-    suffix = Path(path).suffix.lower()
-    if suffix not in (".png", ".svg", ".pdf"):
-        raise InputError(f"a plot is saved as .png, .svg or .pdf, not as {suffix or 'a file without extension'!r}")
+    form = figure_format(path)
     with replacing(path) as temporary:
-        figure.savefig(temporary, format=suffix[1:], dpi=150, bbox_inches="tight")
+        figure.savefig(temporary, format=form, dpi=150, bbox_inches="tight")

@@ -14,10 +14,11 @@ from opencsp_calib.models import LENS_MODELS, LensModel
 from opencsp_calib.normal_equations import solvable_corners
 from opencsp_calib.solving import MIN_CORNERS, check_request, finished
 from opencsp_calib.unknowns import Estimate, Unknowns
+from opencsp_calib_bundle.covariance import checked_covariance
 from opencsp_calib_bundle.levenberg_marquardt import Minimum, minimise
+from opencsp_calib_bundle.remarks import remarks
 from opencsp_calib_bundle.robust import outlying, weights
 from opencsp_calib_bundle.start import start, with_deeper_minima
-from opencsp_calib_bundle.verdict import checked_covariance, remarks
 
 __all__ = ["BundleSolver"]
 
