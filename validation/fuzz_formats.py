@@ -6,9 +6,10 @@ Claim
 Way
     atheris (libFuzzer, guided by coverage of the readers), from the small files of the tests, inputs up to 8 KiB.
 
-Run ``python validation/fuzz_formats.py matlab 60`` (or ``colmap-bin``): 60 seconds with atheris, which has to be
-installed; without arguments, a minute of each. It ends with an error at the first exception that is none of ours, an
-input that takes longer than 5 s, or 1 GiB of memory; what broke it is left in a file by libFuzzer.
+Run ``python validation/bench.py fuzz_formats``, a minute of each format; for longer ``python validation/fuzz_formats.py
+matlab 600`` (or ``colmap-bin``). It ends with an error at the first exception that is none of ours, an input that takes
+longer than 5 s, or 1 GiB of memory; what broke it is left in a file by libFuzzer. It needs atheris, which there is for
+Linux: ``pip install --group studies``.
 """
 
 import contextlib

@@ -7,11 +7,12 @@ Claims
     mrcal's as much as ours, and the one from leaving out views is right to a tenth.
 
 Way
-    Worlds: the demo camera, 12 x 9 corners of 75 mm, 20 views of the seed's procedure, opencv4, the board flat; mrcal
-    2.2 in Debian's Python, without its regularisation, and its ``projection_uncertainty`` with the noise it infers
-    from its residuals. Figures are root mean square lengths over the image, px, and over the worlds. The frame is
-    fixed by the boards: in mrcal by the mean over the views, in ours by the ranges the boards had; errors are aligned
-    as ours are. On Sandia's photographs, of which the truth is not known, the frame's error is most of all.
+    Worlds as in ``uncertainty.py``: the demo camera, 12 x 9 corners of 75 mm, 20 views of the seed's procedure,
+    opencv4, the board flat; mrcal 2.2 in Debian's Python, without its regularisation, and its
+    ``projection_uncertainty`` with the noise it infers from its residuals. Figures are root mean square lengths over
+    the image, px, and over the worlds. The frame is fixed by the boards: in mrcal by the mean over the views, in ours
+    by the ranges the boards had; errors are aligned as ours are. On Sandia's photographs, of which the truth is not
+    known, the frame's error is most of all.
 
 Run ``python validation/bench.py mrcal_uncertainty``: two minutes on an idle machine.
 """
@@ -24,23 +25,17 @@ from pathlib import Path
 import numpy as np
 from _real_data import DATA
 from opencsp_calib_mrcal.process import missing_mrcal
+from uncertainty import BOARD, CAMERA, NOISE
 
 from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions, detect
 from opencsp_calib.comparison import pixel_grid
 from opencsp_calib.projection_sigma import Alignment, board_ranges, sigma_over_range
 from opencsp_calib.registry import installed
-from opencsp_calib.synthetic import demo_camera, observe, seed_poses
+from opencsp_calib.synthetic import observe, seed_poses
 from opencsp_calib.uncertainty import with_uncertainty
 
-BOARD = Checkerboard(12, 9, 0.075)
-CAMERA = demo_camera()
 VIEWS = 20
 WORLDS = 20
-NOISE = {
-    "independent, 0.1 px": {"noise_px": 0.1},
-    "neighbours correlated by 0.35, 0.1 px": {"noise_px": 0.1, "correlation": 0.35},
-    "board flexes by 0.2 mm rms, 0.03 px": {"noise_px": 0.03, "flex_m": 2e-4},
-}
 FAR_M = 1e6
 PYTHON = os.environ.get("OPENCSP_CALIB_MRCAL_PYTHON", "/usr/bin/python3")
 IN_MRCALS_PYTHON = """

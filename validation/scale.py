@@ -7,9 +7,9 @@ Claims
 
 Way
     2 000 rendered photographs of 480 x 360 pixels, all different; the commands as users run them, each in a process of
-    its own. Memory is the peak resident set of the whole process. Time is processor time, user and system, since other
-    work on the machine does not count in it; a run of 20 images gives the start-up, which is taken off. Images looked
-    at are counted by the lines of the journal after every kill.
+    its own. Memory is the peak resident set of the whole process (VmHWM). Time is processor time, user and system,
+    since other work on the machine does not count in it; a run of 20 images gives the start-up, which is taken off.
+    Images looked at are counted by the lines of the journal after every kill.
 
 Run ``python validation/bench.py scale``.
 """
@@ -26,6 +26,7 @@ from pathlib import Path
 
 import numpy as np
 from _photographs import write_photographs
+from _run import Run
 
 from opencsp_calib import Camera, Checkerboard
 from opencsp_calib.hdf5_calibration import load_observations
@@ -48,26 +49,18 @@ def photographs(root: Path) -> None:
             os.link(file, root / str(count) / file.name)
 
 
-def measured(*arguments: str) -> tuple[float, float]:
-    """Processor seconds and peak MB of a run of the command line."""
-    command = [sys.executable, "-m", "opencsp_calib", *arguments]
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    if status:
-        raise RuntimeError(f"failed: {command}")
-    return usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
-
-
 def growth(root: Path) -> None:
     """Memory and time by the number of images."""
     print("| command | images | peak MB | of 200 | processor s | less start-up, of 200 |\n|---|---|---|---|---|---|")
     for name, options in (("detect", []), ("calibrate --select 60", ["--select", "60"])):
-        command = [name.split()[0], "--board", SPEC, "-o", str(root / "out.h5"), *options]
-        found = {count: measured(*command, str(root / str(count))) for count in (FEW, SOME, MANY)}
-        for count in (SOME, MANY):
-            (seconds, peak), (base, _) = found[count], found[FEW]
-            ratios = peak / found[SOME][1], (seconds - base) / (found[SOME][0] - base)
-            print(f"| {name} | {count} | {peak:.0f} | {ratios[0]:.2f} | {seconds:.1f} | {ratios[1]:.1f} |", flush=True)
+        command = [sys.executable, "-m", "opencsp_calib", name.split()[0], "--board", SPEC, *options]
+        command += ["-o", str(root / "out.h5")]
+        few, some, many = (Run.of([*command, str(root / str(count))]) for count in (FEW, SOME, MANY))
+        for count, run in ((SOME, some), (MANY, many)):
+            memory, time_ = run.peak_mb / some.peak_mb, (run.cpu_s - few.cpu_s) / (some.cpu_s - few.cpu_s)
+            print(
+                f"| {name} | {count} | {run.peak_mb:.0f} | {memory:.2f} | {run.cpu_s:.1f} | {time_:.1f} |", flush=True
+            )
     print(f"\nin proportion, less start-up, would be {(MANY - FEW) / (SOME - FEW):.1f}\n")
 
 

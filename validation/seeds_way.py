@@ -7,15 +7,17 @@ Claim
 
 Way
     The seed's procedure (demo camera, 21 x 18 corners, half of the views turned), corners made with noise of 0.1 px.
-    Each cell is a process of its own: seconds of the call alone (`Solver.solve` with a flat board and equal weights;
-    the whole of `opencsp_calib.solve`; `cv2.calibrateCamera`, four coefficients), and by how many MB its peak memory is
-    above what it was before the call. Ratios are to OpenCV's time in the same row. With an argument, another Python
-    (with the OpenCV 4.9 that OpenCSP pins) runs its ``calibrateCamera``, too.
+    Each cell is a process of its own, with BLAS on one thread: processor seconds of the call alone (`Solver.solve` with
+    a flat board and equal weights; the whole of `opencsp_calib.solve`; `cv2.calibrateCamera`, four coefficients), and
+    by how many MB its peak memory (VmHWM, Linux only) is above what it was before the call. Ratios are to OpenCV's time
+    in the same row. With an argument, another Python (with the OpenCV 4.9 that OpenCSP pins) runs its
+    ``calibrateCamera``, too.
 
-Run ``python validation/seeds_way.py [PYTHON WITH OPENCV 4.9]``.
+Run ``python validation/bench.py seeds_way``, or ``python validation/seeds_way.py PYTHON_WITH_OPENCV_4.9``.
 """
 
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -31,14 +33,15 @@ PINNED_VIEWS = 200  # OpenCV 4.9 grows with the cube of the views: 22 s for thes
 BOARD = Checkerboard(21, 18, 0.05)
 NOISE_PX = 0.1
 MEASURED = """
-import json, resource, sys, time
+import json, re, sys, time
 import numpy as np
 data = np.load(sys.argv[1])
 {prepare}
-def peak(): return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-before, start = peak(), time.perf_counter()
+def peak_mb():  # not by ru_maxrss, which begins with that of the process that started this one
+    return int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1]) / 1024
+before, start = peak_mb(), time.process_time()
 {call}
-print(json.dumps([time.perf_counter() - start, peak() - before]))
+print(json.dumps([time.process_time() - start, peak_mb() - before]))
 """
 AS_LISTS = """
 import cv2
@@ -71,8 +74,9 @@ WAYS = {
 
 def measured(python: str, way: tuple[str, str], data: Path) -> tuple[float, float]:
     """Seconds, and MB above what there was before."""
-    source = MEASURED.format(prepare=way[0], call=way[1])
-    done = subprocess.run([python, "-c", source, data], check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    command = [python, "-c", MEASURED.format(prepare=way[0], call=way[1]), data]
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # whose threads count while they wait
+    done = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment)
     seconds, megabytes = json.loads(done.stdout)
     return seconds, megabytes
 

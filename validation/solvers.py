@@ -9,7 +9,8 @@ Way
     The synthetic world is the seed's procedure: the demo camera, 50 views of 22x19 corners at 30 to 45 degrees. "Worst"
     is the largest difference over a grid of 40x30 pixels from edge to edge; the frames are aligned by a rotation only
     where that is said. "Sigmas left" is how far the camera is from the least sum of squares, by our own normal
-    equations. Times are wall times of `Solver.solve`, mrcal's with the start of its Python, the quickest of three.
+    equations. OpenCV and COLMAP run on one thread, so that the same run gives the same camera. Times are wall times of
+    `Solver.solve`, mrcal's with the start of its Python, the quickest of three.
 
 Run ``python validation/bench.py solvers``.
 """

@@ -17,16 +17,14 @@ Run ``python validation/bench.py whole_run``.
 """
 
 import os
-import re
 import subprocess
 import sys
 import tempfile
-import time
-from dataclasses import dataclass
 from pathlib import Path
 from venv import EnvBuilder
 
 from _photographs import write_photographs
+from _run import Run
 
 from opencsp_calib import Camera, Checkerboard
 from opencsp_calib.synthetic import demo_camera, seed_poses
@@ -52,35 +50,6 @@ cv.calibrateCamera(board, corners, image.shape[::-1], None, np.zeros(4), flags=c
 SPEC = "checkerboard:21x18:50mm"
 PINNED = ("opencv-python-headless>=4.9,<4.10", "numpy<2")
 SMALL = Camera("small", "opencv4", [1100, 1100, 320, 240, -0.1, 0.05, 0, 0], (640, 480))
-
-
-@dataclass(frozen=True)
-class Run:
-    """What one run of a command took."""
-
-    wall_s: float
-    cpu_s: float
-    peak_mb: float
-
-    @classmethod
-    def of(cls, command: list[str]) -> "Run":
-        """Run it."""
-        started = time.perf_counter()
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
-        peak_mb, ended = 0.0, 0
-        while not ended:
-            peak_mb = max(peak_mb, _peak_mb(process.pid))
-            time.sleep(0.01)
-            ended, status, usage = os.wait4(process.pid, os.WNOHANG)
-        if status:
-            raise RuntimeError(f"failed: {command}")
-        return cls(time.perf_counter() - started, usage.ru_utime + usage.ru_stime, peak_mb)
-
-
-def _peak_mb(pid: int) -> float:
-    """Of a running process. Its `ru_maxrss` is no use: it has that of the process that started it."""
-    found = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{pid}/status").read_text(encoding="ascii"))
-    return int(found[1]) / 1024 if found else 0.0
 
 
 def photographs(folder: Path, count: int, camera: Camera) -> None:
