@@ -67,12 +67,12 @@ def leaves_out_outliers(solver: Solver, setup: Setup) -> None:
 
 
 def finds_a_warp(solver: Solver, setup: Setup) -> None:
-    """A board with a smooth bow, taken for flat, gives the camera all the same; the board comes out bowed."""
+    """A bowed board given as flat: its bow is found by the few terms of a warp, the camera as if it were known."""
     _promise_shape(solver, "warp")
 
 
 def finds_the_shape(solver: Solver, setup: Setup) -> None:
-    """A board with a smooth bow, taken for flat, gives the camera all the same; the board comes out bowed."""
+    """The same with every corner of the board free."""
     _promise_shape(solver, "free")
 
 

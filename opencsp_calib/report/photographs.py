@@ -1,7 +1,6 @@
 """The photographs in a report: thumbnails with their corners and residual arrows."""
 
 import base64
-import hashlib
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from html import escape
@@ -19,6 +18,7 @@ from opencsp_calib.images import ImageFile, encode_thumbnail, read_image
 __all__ = ["photographs"]
 
 THUMBNAIL_PX = 480
+ARROW = 0.02  # of the image's width: how long the arrow of a residual as large as the rms is
 TOGETHER = 64  # views, whose photographs are read at the same time as cores allow
 
 
@@ -32,7 +32,7 @@ def photographs(calibration: Calibration) -> Iterator[str]:
     places: Mapping[str, str] = calibration.provenance.get("images", {})
     used = [view.image for view in calibration.observations.used]
     residuals = dict(zip(used, calibration.residuals, strict=True))
-    enlarged = 0.02 * calibration.camera.image_size[0] / max(calibration.rms_px, 1e-9)
+    enlarged = ARROW * calibration.camera.image_size[0] / max(calibration.rms_px, 1e-9)
     with ThreadPoolExecutor() as pool:
         for first in range(0, len(views), TOGETHER):
             some = views[first : first + TOGETHER]
@@ -66,17 +66,13 @@ def _figure(view: View, thumbnail: str, calibration: Calibration, residuals: Flo
     problems = "; ".join(escape(problem.message) for problem in view.problems)
     rms = "" if residuals is None else f", rms {np.sqrt((residuals**2).sum(axis=1).mean()):.3f} px"
     return (
-        f'<figure class="view" id="{_anchor(view.image)}">'
+        '<figure class="view">'
         f'<svg viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="{escape(view.image, quote=True)}">'
         f'<rect class="empty" x="-0.5" y="-0.5" width="{width}" height="{height}"/>'
         f"{picture}{corners}{rejected}{arrows}</svg>"
         f"<figcaption><b>{escape(view.image)}</b>: {view.status}, {len(view.detection)} corners{rms}"
         f"{'<br>' + problems if problems else ''}</figcaption></figure>"
     )
-
-
-def _anchor(name: str) -> str:
-    return "view-" + hashlib.sha256(name.encode()).hexdigest()[:12]
 
 
 def _dots(pixels: Pixels, size: float, kind: str = "corners") -> str:

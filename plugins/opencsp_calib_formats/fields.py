@@ -28,6 +28,11 @@ class Fields:
         As `safe_text` and `safe_yaml` give it; anything else is a FileFormatError.
     where : str
         What messages put before a field's name: ``cam0``.
+
+    Raises
+    ------
+    FileFormatError
+        By every method, with the field's name, if the field is missing and has no default, or is not what is asked for.
     """
 
     def __init__(self, values: Any, where: str = "") -> None:

@@ -25,6 +25,7 @@ from opencsp_calib_formats.fields import Fields, whole
 from opencsp_calib_formats.mat_file import OBJECTS, is_mat, read_mat
 from opencsp_calib_formats.mat_v5 import Opaque
 from opencsp_calib_formats.opencv_camera import opencv_camera
+from opencsp_calib_formats.other_camera import each_camera
 from opencsp_calib_formats.reading import FileFormat, naming
 from opencsp_calib_formats.safe_text import head, parse_json, read_text
 from opencsp_calib_formats.scaramuzza import scaramuzza
@@ -68,7 +69,7 @@ class Matlab(FileFormat):
                 raise FileFormatError("holds no camera parameters or intrinsics of MATLAB's")
             named = _named(_distinct(found), content)
             single = len(named) == 1
-            return {key: _imported(path.stem if single else f"{path.stem} {key}", f) for key, f in named.items()}
+            return each_camera(named, lambda key, f: _imported(path.stem if single else f"{path.stem} {key}", f))
 
 
 def _cameras(value: Any, key: str, depth: int) -> Iterator[tuple[str, Fields]]:
@@ -110,25 +111,19 @@ def _identity(fields: Fields) -> list[str]:
     return [name for name in (*MATRICES, "FocalLength", "PrincipalPoint", "ImageSize", *KINDS) if name in fields]
 
 
-def _named(cameras: Mapping[str, Fields], content: Any) -> dict[str, Fields]:
-    """Saved objects have the name of their variable where there is one of each, else a number."""
+def _named(cameras: Mapping[str, Fields], content: Any) -> list[tuple[str, Fields]]:
+    """Saved objects have the name of their variable where there is one, else ``camera``."""
     inside = [key for key in cameras if key.split(".")[0] == OBJECTS]
     if not inside:
-        return dict(cameras)
+        return list(cameras.items())
     variables = [key for key, value in content.items() if isinstance(value, Opaque)]
     variable = variables[0] if len(variables) == 1 else "camera"
-    names = {}
+    named = []
     for key, fields in cameras.items():
         last = key.rpartition(".")[2]
         own = f"{variable}.{last}" if last.startswith("CameraParameters") else variable
-        own = own if key in inside else key
-        count = 1
-        name = own
-        while name in names:
-            count += 1
-            name = f"{own} ({count})"
-        names[name] = fields
-    return names
+        named.append((own if key in inside else key, fields))
+    return named
 
 
 def _imported(name: str, fields: Fields) -> Imported:

@@ -16,12 +16,12 @@ __all__ = ["equidistant", "equisolid"]
 
 
 def equidistant(points: Points) -> Floats:
-    """(N, 2) whose length is the angle to the axis, radians; NaN straight behind the camera."""
+    """(N, 2) of points (N, 3): their length is the angle to the axis, radians; NaN straight behind the camera."""
     return _along_radius(points, lambda theta: theta)
 
 
 def equisolid(points: Points) -> Floats:
-    """(N, 2) whose length is twice the sine of half the angle to the axis; NaN straight behind the camera."""
+    """(N, 2) of points (N, 3): their length is twice the sine of half the angle to the axis; NaN straight behind."""
     return _along_radius(points, lambda theta: 2.0 * np.sin(theta / 2.0))
 
 

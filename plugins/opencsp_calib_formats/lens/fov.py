@@ -20,8 +20,14 @@ def fov(plane: Floats, w: float) -> Floats:
     Parameters
     ----------
     plane : (N, 2)
+        Undistorted.
     w : float
         Radians, between -pi and pi; 0 is no distortion.
+
+    Returns
+    -------
+    (N, 2)
+        For every point of the plane: the model images all that is before the camera.
     """
     if w == 0.0:
         return plane
