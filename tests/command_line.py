@@ -10,11 +10,12 @@ from opencsp_calib.cli import run
 QUICK = ("--solver", "opencv")
 
 
-def answer(capsys: pytest.CaptureFixture[str], *arguments: object) -> dict:
+def answer(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 0) -> dict:
     """The JSON that a command prints, which must be as documented; standard output must hold nothing else."""
-    code = run([*map(str, arguments), "--json"])
+    ended = run([*map(str, arguments), "--json"])
     output = capsys.readouterr()
-    assert code == 0, output.err
+    assert ended == code, output.err
+    assert "Traceback" not in output.err
     printed = json.loads(output.out)
     assert_as_documented(str(arguments[0]), printed)
     return printed

@@ -7,19 +7,20 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import answer, complaint
 from worlds import SmallWorld
 
 from opencsp_calib import Camera
 from opencsp_calib.cli import run
+from opencsp_calib.images import find_images, read_image
 
 
 def test_compare_says_how_far_apart(small_world: SmallWorld, camera_file: Path, tmp_path: Path, capsys) -> None:
     small_world.camera.save(tmp_path / "truth.h5")
     plot = tmp_path / "difference.png"
     printed = answer(capsys, "compare", camera_file, tmp_path / "truth.h5", "--plot", plot)
-    assert set(printed) == {"rms_px", "median_px", "worst_px", "rotation_deg", "range_m"}
     assert printed["worst_px"] < 0.2
     assert printed["range_m"] is None
     assert plot.read_bytes().startswith(b"\x89PNG")
@@ -28,19 +29,20 @@ def test_compare_says_how_far_apart(small_world: SmallWorld, camera_file: Path, 
 
 def test_undistort_writes_images(camera_file: Path, photographs: Path, tmp_path: Path, capsys) -> None:
     assert run(["undistort", str(camera_file), str(photographs), "-o", str(tmp_path / "flat")]) == 0
-    assert len(list((tmp_path / "flat").iterdir())) == 12
+    camera, files = Camera.load(camera_file), find_images(photographs)
+    flat = {file.name: read_image(file).pixels for file in find_images(tmp_path / "flat")}
+    assert list(flat) == [file.name for file in files]
+    for file in files:
+        assert np.array_equal(flat[file.name], camera.undistort(read_image(file).pixels))
     assert "another folder" in complaint(capsys, "undistort", camera_file, photographs, "-o", photographs)
 
 
 def test_validate_lets_solvers_answer_without_images(camera_file: Path, tmp_path: Path, capsys) -> None:
     report = tmp_path / "v.html"
     printed = answer(capsys, "validate", camera_file, "--solvers", "bundle,opencv", "--report", report)
-    assert set(printed) == {"solvers", "differences", "halves", "held_out", "models", "verdict", "reasons"}
     assert set(printed["solvers"]) == {"bundle", "opencv"}
-    assert set(printed["solvers"]["opencv"]) == {"version", "rms_px", "params", "seconds"}
-    assert set(printed["differences"][0]) == {"a", "b", "rms_px", "worst_px", "agree"}
     assert printed["differences"][0]["worst_px"] < 1e-4
-    assert set(printed["halves"]) == {"median_px", "worst_px", "predicted_px"}
+    assert printed["halves"]["worst_px"] > 0
     assert printed["verdict"] == "agree"
     assert "The solvers agree" in report.read_text(encoding="utf-8")
 
@@ -50,7 +52,6 @@ def test_check_tells_a_good_camera_from_a_bad_one(
 ) -> None:
     small_world.camera.save(tmp_path / "good.h5")
     printed = answer(capsys, "check", tmp_path / "good.h5", photographs, "--board", SmallWorld.spec)
-    assert set(printed) == {"rms_px", "worst_px", "predicted_px", "verdict"}
     assert printed["verdict"] == "ok"
     params = small_world.camera.params.copy()
     params[:2] *= 1.01
@@ -66,17 +67,17 @@ def test_check_takes_the_board_that_the_camera_was_calibrated_with(
     assert answer(capsys, "check", camera_file, photographs)["verdict"] == "ok"
 
 
-@pytest.mark.parametrize("suffix", ["svg", "pdf", "png"])
-def test_a_board_is_drawn(suffix: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("suffix", "start"), [("svg", b"<svg"), ("pdf", b"%PDF"), ("png", b"\x89PNG")])
+def test_a_board_is_drawn_in_the_format_that_its_name_says(suffix: str, start: bytes, tmp_path: Path) -> None:
     path = tmp_path / f"board.{suffix}"
     assert run(["board", "checkerboard:9x6:20mm", "-o", str(path)]) == 0
-    assert path.stat().st_size > 500
+    assert path.read_bytes().startswith(start)
 
 
 def test_plugins_and_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     names = {(entry["kind"], entry["name"]) for entry in answer(capsys, "plugins")["plugins"]}
     assert {("solver", "bundle"), ("detector", "checkerboard"), ("board", "charuco")} <= names
-    assert {"opencsp", "colmap"} & {entry["name"] for entry in answer(capsys, "formats")["formats"]}
+    assert {"opencsp", "colmap"} <= {entry["name"] for entry in answer(capsys, "formats")["formats"]}
 
 
 def test_convert_takes_typed_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -59,19 +59,18 @@ def test_one_bad_image_is_listed_and_does_not_stop_the_run(
 @pytest.mark.parametrize(
     ("spec", "words"),
     [
-        ("18x23", "checkerboard:"),
+        ("18x23", "write checkerboard:COLUMNSxROWS:SIZE or charuco:"),
         ("checkerboard:9x6", "size of a square"),
-        ("checkerboard:9x6:30", "unit"),
-        ("checkerboard:9:30mm", "9x6|COLUMNSxROWS|columns"),
+        ("checkerboard:9x6:30", "has no unit"),
+        ("checkerboard:9:30mm", "'9', is not two whole numbers with an x between them"),
         ("checkerboard:9x6:30mm:extra", "checkerboard:COLUMNSxROWS:SIZE"),
         ("charuco:4x5:54mm:40mm:DICT_NONE", "DICT_4X4_50"),
-        ("dots:4x5:3mm", "dots"),
-        ("missing.json", "missing.json"),
+        ("dots:4x5:3mm", "write checkerboard:COLUMNSxROWS:SIZE or charuco:"),
+        ("missing.json", "missing.json cannot be read: No such file"),
     ],
 )
 def test_a_wrong_board_says_how_it_is_written(spec: str, words: str, photographs: Path, capsys) -> None:
-    line = complaint(capsys, "calibrate", photographs, "--board", spec)
-    assert any(word in line for word in words.split("|")), line
+    assert words in complaint(capsys, "calibrate", photographs, "--board", spec)
 
 
 def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, capsys) -> None:
@@ -145,7 +144,7 @@ def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureF
     assert "KEY=VALUE" in complaint(capsys, *base, "--note", "f8")
     assert "free, square or a number" in complaint(capsys, *base, "--pixel-aspect", "round")
     assert "WIDTHxHEIGHT" in complaint(capsys, "show", camera_file, "--image-size", "big")
-    assert complaint(capsys, "nonsense")
+    assert "'nonsense'" in complaint(capsys, "nonsense")
     assert ".png, .svg or .pdf" in complaint(capsys, "compare", camera_file, camera_file, "--plot", "x.gif")
 
 

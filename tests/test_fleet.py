@@ -1,12 +1,11 @@
 """Many cameras in one run: isolated failures, verdicts, what has changed since last time, files that are wrong."""
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from json_page import assert_as_documented
+from command_line import answer, complaint
 from worlds import SmallWorld
 
 from opencsp_calib import Camera
@@ -31,15 +30,6 @@ def link(photographs: Path, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for path in sorted(photographs.glob("*.png"))[1:11]:  # at least ten, or they are too few to be good
         (folder / path.name).write_bytes(path.read_bytes())
-
-
-def answer(capsys: pytest.CaptureFixture[str], *arguments: object, code: int = 0) -> dict:
-    assert run([*map(str, arguments), "--json"]) == code
-    output = capsys.readouterr()
-    assert "Traceback" not in output.err
-    printed = json.loads(output.out)
-    assert_as_documented("fleet", printed)
-    return printed
 
 
 def test_a_fleet(photographs: Path, refocused: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -140,15 +130,15 @@ def test_a_wrong_file_is_told_with_its_line(
 def test_wrong_use(
     make: Callable[[Path], Path], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert run(["fleet", str(make(tmp_path)), *BOARD]) == 2
-    assert words in capsys.readouterr().err
+    assert words in complaint(capsys, "fleet", make(tmp_path), *BOARD)
 
 
 def test_a_board_must_be_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "1.png").write_bytes(b"")
-    assert run(["fleet", str(tmp_path)]) == 1
-    assert "--board SPEC" in capsys.readouterr().err
+    (failed,) = answer(capsys, "fleet", tmp_path, code=1)["cameras"]
+    assert failed["verdict"] == "failed"
+    assert "--board SPEC" in failed["sentence"]
 
 
 def test_folders_in_natural_order(tmp_path: Path) -> None:
