@@ -1,6 +1,7 @@
 """A page as PDF, in points of 1/72 inch.
 
-Source: PDF 32000-1:2008, sections 7.5 (file structure), 8.5 (paths), 9.4 (text), 9.6.2.2 (the standard fonts).
+Source: PDF 32000-1:2008, sections 7.5 (file structure), 8.5 (paths), 9.4 (text), 9.6.2.2 (the standard fonts), annex D
+(the encoding of words, which is cp1252; other letters become question marks).
 """
 
 from pathlib import Path
@@ -32,7 +33,7 @@ def write_pdf(page: Page, path: Path) -> None:
         b"<</Type/Page/Parent 2 0 R/MediaBox[0 0 %.5f %.5f]/Contents 4 0 R/Resources<</Font<</F 5 0 R>>>>>>"
         % (width, height),
         b"<</Length %d>>stream\n%b\nendstream" % (len(content), content),
-        b"<</Type/Font/Subtype/Type1/BaseFont/Courier>>",
+        b"<</Type/Font/Subtype/Type1/BaseFont/Courier/Encoding/WinAnsiEncoding>>",
     ]
     file = b"%PDF-1.4\n"
     offsets = []
@@ -54,7 +55,7 @@ def _content(page: Page, height: float) -> bytes:
         lines.append(b"%.5f %.5f %.5f %.5f re" % (left, height - bottom, right - left, bottom - top))
     lines.append(b"f")
     for text in page.texts:
-        words = text.words.encode("ascii", "replace")
+        words = text.words.encode("cp1252", "replace")
         for special in (b"\\", b"(", b")"):
             words = words.replace(special, b"\\" + special)
         place = (text.x_m * POINTS, height - text.y_m * POINTS)
