@@ -12,8 +12,6 @@ from opencsp_calib.registry import installed
 from opencsp_calib.rendering import Exposure, Scene, render
 
 BOARD = Checkerboard(11, 8, 0.03)
-
-
 SIZE = (480, 360)
 
 

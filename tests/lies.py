@@ -12,7 +12,7 @@ from opencsp_calib.image import Image
 
 def caught(liar, check: str, **setup) -> str:
     """What the check says of the liar; fails where it says nothing."""
-    import pytest
+    import pytest  # here: a check loads this module in a process of its own, and looks at what comes with it
 
     found = {c.name: c for c in checks_of(liar, **setup)}[check]
     with pytest.raises(AssertionError) as said:

@@ -1,5 +1,6 @@
 """Worlds that the solvers' tests share, and other programs' solutions to hold against."""
 
+import h5py
 import numpy as np
 
 from opencsp_calib.board import Checkerboard
@@ -25,8 +26,6 @@ def worst_px(a: Camera, b: Camera) -> float:
 
 def sandia(data_dir):
     """The seed's own corners of Sandia's ten images, as OpenCSP has stored them, and its result."""
-    import h5py
-
     with h5py.File(data_dir / "sandia_checkerboard" / "expected_opencsp.h5") as file:
         expected = {name: file[name][()] for name in file if name != "image_shape_xy"}
     views = [

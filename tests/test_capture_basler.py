@@ -75,11 +75,11 @@ def test_a_camera_in_use_frames_that_fail_and_no_trigger_are_one_sentence_each(t
     small = ["--device", "0815-0000", "--set", "Width=64", "--set", "Height=48", "--release", "interval:0"]
     holder = [*COMMAND, str(tmp_path / "one"), "--board", SPEC, *small, "--count", "100000"]
     with subprocess.Popen(holder, env=emulated(2), stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True) as held:
-        for line in held.stderr:
-            if line.startswith("0001.png"):
-                break
-        busy = captured(tmp_path / "two", *small)
-        held.kill()
+        try:
+            assert any(line.startswith("0001.png") for line in held.stderr)
+            busy = captured(tmp_path / "two", *small)
+        finally:
+            held.kill()
     assert busy.returncode == 2
     assert "error: the camera 0815-0000 is in use by another program" in busy.stderr
     failing = captured(tmp_path / "three", *small, "--set", "ForceFailedBuffer=1", "--set", "ExposureTime=1000")

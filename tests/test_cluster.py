@@ -26,7 +26,7 @@ from opencsp_calib.looking import Search
 from opencsp_calib.registry import installed
 
 distributed = pytest.importorskip("distributed", reason="pip install 'opencsp-calib[dask]'")
-dask = pytest.importorskip("dask")
+dask = pytest.importorskip("dask", reason="pip install 'opencsp-calib[dask]'")
 
 WAIT_S = 240  # for a busy machine; nothing waits longer than it must
 

@@ -112,7 +112,9 @@ def test_the_sketch_has_the_outline_where_it_is():
     rows = [row for row, line in enumerate(lines) if "#" in line]
     assert (rows[0], rows[-1]) == (len(lines) // 2, len(lines) - 2)
     assert lines[rows[0]] == "|" + " " * 16 + "#" * 16 + "|"
-    assert sketch({"#": np.full((3, 2), np.nan)}, (640, 480))
+    unseen = sketch({"#": np.full((3, 2), np.nan)}, (640, 480), columns=32)
+    assert len(unseen) == len(lines)
+    assert "#" not in "".join(unseen)
 
 
 def test_candidates_show_the_whole_board_as_the_procedure_asks():

@@ -87,8 +87,8 @@ def test_hardly_matters_which_camera_comes_first(range_m: float | None) -> None:
     turn=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
     shift=st.tuples(*[st.floats(-0.05, 0.05)] * 3),
 )
-def test_a_frame_change_that_a_fisheye_cannot_absorb_is_found(turn: tuple, shift: tuple) -> None:
-    """`frame_jacobian` is the derivative of projection by a turn and a shift: proved by differences, any direction."""
+def test_the_jacobian_of_the_frame_is_the_derivative_by_a_turn_and_a_shift(turn: tuple, shift: tuple) -> None:
+    """In any direction, by differences."""
     rays = FISHEYE.unproject(pixel_grid(SIZE, (5, 4)).reshape(-1, 2)) * 2.0
     _, by_point, _ = FISHEYE.lens.project_with_jacobians(rays, FISHEYE.params)
     predicted = frame_jacobian(by_point, rays, shifted=True) @ np.array([*turn, *shift])

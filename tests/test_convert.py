@@ -13,7 +13,7 @@ import pytest
 
 from opencsp_calib import Camera
 from opencsp_calib.cli import run
-from opencsp_calib.hdf5 import load_record
+from opencsp_calib.hdf5 import load_record, save_camera
 
 K, RADIAL = [[900.0, 0, 500], [0, 901.0, 400], [0, 0, 1]], [-0.2, 0.05, 0.01, -0.03]
 EYE = """
@@ -75,9 +75,9 @@ def test_text_files_keep_the_notes_and_are_read_as_before(kind: str, stereo: Pat
     out, plain = tmp_path / f"camera.{kind}", tmp_path / f"plain.{kind}"
     to = ["--to", NAMED[kind]] if kind in NAMED else []
     model = "pinhole" if kind == "kalibr.yaml" else "opencv4"
-    fit = ["--camera", "left", "--fit", model, "--accept-error", 1000, *to]
-    command("convert", stereo, tmp_path / "camera.h5", *fit[:-2], *([] if to else fit[-2:]))
-    command("convert", stereo, out, *fit)
+    fit = ["--camera", "left", "--fit", model, "--accept-error", 1000]
+    command("convert", stereo, tmp_path / "camera.h5", *fit)
+    command("convert", stereo, out, *fit, *to)
     text = out.read_text()
     assert f"{model}, rms " in text
     assert "0.5 px too small" in text
@@ -151,8 +151,6 @@ def test_formats_say_what_is_exact_and_what_is_fitted(capsys: pytest.CaptureFixt
 
 
 def test_a_camera_file_converted_keeps_its_name_numbers_and_record(tmp_path: Path) -> None:
-    from opencsp_calib.hdf5 import save_camera
-
     camera = Camera("cam", "opencv4", np.array([900.0, 901, 500, 400, *RADIAL]), (1000, 800))
     save_camera(camera, tmp_path / "a.h5", {"aperture": "f/8"})
     command("convert", tmp_path / "a.h5", tmp_path / "b.h5", "--name", "other")

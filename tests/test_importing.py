@@ -18,7 +18,7 @@ CAMERA = Camera("a", "opencv4", PARAMS, (640, 480))
 
 @dataclass
 class Made:
-    """Recognises files that begin with its name, and reads what it is given."""
+    """Recognises files that its name is in, and reads what it is given."""
 
     name: str
     cameras: Mapping[str, Imported]

@@ -24,8 +24,8 @@ def seen(focal, model="pinhole", distortion=(), aspect=1.0, board=BOARD, size=(1
     return camera, where, observe(camera, board, where, noise_px=0.2, nominal=board)
 
 
-def check_start(camera, poses, observations, model=None, focal=0.05, direction=0.1):
-    start = initial_camera(observations, model or camera.model)
+def check_start(camera, poses, observations, focal=0.05, direction=0.1):
+    start = initial_camera(observations, camera.model)
     assert start.params[0] == pytest.approx(camera.params[0], rel=focal)
     for pose, truth in zip(initial_poses(start, observations), poses, strict=True):
         assert np.linalg.norm((pose.matrix.T @ truth.matrix) - np.eye(3)) < 2.5 * direction

@@ -106,8 +106,11 @@ def test_distortion_that_folds_inside_the_image_is_bad() -> None:
     assert fold_inside(WORLD.camera) is None
 
 
-def test_correlations_have_ones_on_the_diagonal() -> None:
-    np.testing.assert_allclose(np.diag(correlations(result(WORLD.poses))), 1.0)
+def test_correlations_are_those_of_the_covariance() -> None:
+    given = np.eye(8)
+    given[0, 1] = given[1, 0] = 0.75
+    known = replace(result(WORLD.poses), covariance=given * np.outer(SIGMA, SIGMA))
+    np.testing.assert_allclose(correlations(known), given, atol=1e-12)
     unknown = replace(result(WORLD.poses), covariance=None)
     assert np.isnan(correlations(unknown)).all()
 

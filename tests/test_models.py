@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -45,7 +46,6 @@ def grid(size: tuple[int, int] = SIZE) -> np.ndarray:
 
 
 def by_opencv(camera: Camera, points: np.ndarray) -> np.ndarray:
-    cv2 = pytest.importorskip("cv2")
     zero = np.zeros(3)
     if camera.model == "opencv_fisheye":
         return cv2.fisheye.projectPoints(points[:, None], zero, zero, camera.matrix, camera.distortion)[0][:, 0]
@@ -74,7 +74,7 @@ def test_unprojects_to_unit_vectors_that_project_back(model: str) -> None:
     [("pinhole", "PINHOLE"), ("opencv4", "OPENCV"), ("opencv8", "FULL_OPENCV"), ("opencv_fisheye", "OPENCV_FISHEYE")],
 )
 def test_projects_as_colmap_half_a_pixel_off(model: str, theirs: str) -> None:
-    pycolmap = pytest.importorskip("pycolmap")
+    pycolmap = pytest.importorskip("pycolmap", reason="pip install 'opencsp-calib[colmap]'")
     camera = CAMERAS[model]
     params = camera.params.copy()
     params[2:4] += 0.5  # COLMAP counts from the upper-left corner of the upper-left pixel

@@ -28,7 +28,7 @@ def test_solution_and_covariance_are_those_of_the_dense_pseudo_inverse(shape, as
     q = basis.shape[1]
     expected = basis @ scaled_pinv(matrix)[:q, :q] @ basis.T
     sigma = np.sqrt(np.diag(expected))
-    assert np.abs((factorise(dense.equations).camera_covariance - expected) / np.outer(sigma, sigma)).max() < 1e-6
+    assert np.abs((factor.camera_covariance - expected) / np.outer(sigma, sigma)).max() < 1e-6
 
 
 def test_views_head_on_determine_nothing():

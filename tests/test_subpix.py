@@ -17,6 +17,13 @@ def near(photograph: Photograph, off_px: float = 0.7) -> Detection:
     return Detection(np.arange(len(photograph.pixels)), photograph.pixels + offset)
 
 
+def in_the_seeds_way(photograph: Photograph, start: Detection) -> Detection:
+    """With a window that is the same for all."""
+    near = start.pixels.astype(np.float32).reshape(-1, 1, 2)
+    found = cv2.cornerSubPix(photograph.image.pixels, near, (11, 11), (-1, -1), UNTIL)
+    return Detection(start.ids, found.reshape(-1, 2))
+
+
 def rms_px(detection: Detection, photograph: Photograph) -> float:
     return float(np.sqrt(((detection.pixels - photograph.pixels) ** 2).sum(axis=1).mean()))
 
@@ -24,19 +31,14 @@ def rms_px(detection: Detection, photograph: Photograph) -> float:
 def test_on_large_squares_it_is_the_seeds_way() -> None:
     photograph = Photograph.of(BOARD)
     start = near(photograph)
-    expected = cv2.cornerSubPix(
-        photograph.image.pixels, start.pixels.astype(np.float32).reshape(-1, 1, 2), (11, 11), (-1, -1), UNTIL
-    )
-    assert np.abs(refine_subpix(photograph.image, start).pixels - expected.reshape(-1, 2)).max() < 1e-3
+    expected = in_the_seeds_way(photograph, start)
+    assert np.abs(refine_subpix(photograph.image, start).pixels - expected.pixels).max() < 1e-3
 
 
 def test_on_small_squares_the_window_does_not_swallow_neighbours() -> None:
     photograph = Photograph.of(BOARD, fill=0.17)
     start = near(photograph)
-    fixed = cv2.cornerSubPix(
-        photograph.image.pixels, start.pixels.astype(np.float32).reshape(-1, 1, 2), (11, 11), (-1, -1), UNTIL
-    )
-    assert rms_px(Detection(start.ids, fixed.reshape(-1, 2)), photograph) > 1
+    assert rms_px(in_the_seeds_way(photograph, start), photograph) > 1
     assert rms_px(refine_subpix(photograph.image, start), photograph) < 0.15
 
 

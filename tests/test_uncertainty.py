@@ -108,7 +108,7 @@ def test_outliers_count_for_nothing(observations: Observations) -> None:
     assert with_uncertainty(robust).covariance == pytest.approx(with_uncertainty(plain).covariance, rel=1e-4)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seed=st.integers(0, 10_000), rank=st.integers(0, 6), held=st.booleans())
 def test_honest_is_the_jackknife_and_on_the_whole_not_below_the_residual_one(seed: int, rank: int, held: bool) -> None:
     rng = np.random.default_rng(seed)
@@ -238,5 +238,4 @@ def test_views_that_do_not_determine_the_camera_are_said_to() -> None:
     bare = replace(CAMERA, params=[*CAMERA.params[:4], 0, 0, 0, 0])
     guess = Calibration(bare, seen, level, BOARD, "by hand", WAYS["flat"])
     result = with_uncertainty(guess)
-    unknown = np.isnan(result.sigma).all() or result.sigma[0] > 1e3
-    assert unknown
+    assert np.isnan(result.sigma).all() or result.sigma[0] > 1e3
