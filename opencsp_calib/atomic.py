@@ -125,4 +125,4 @@ def _take_permissions(temporary: Path, path: Path) -> None:
         mask = os.umask(0)
         os.umask(mask)
         mode = 0o666 & ~mask
-    temporary.chmod(mode)
+    os.chmod(temporary, mode)

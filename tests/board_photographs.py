@@ -77,10 +77,14 @@ class Photograph:
 
     def farthest_alike_px(self, detection: Detection) -> float:
         """The same, where the board looks the same after some turns, in the best of them."""
+        return float(self.off_px(detection).max(initial=0))
+
+    def off_px(self, detection: Detection) -> Floats:
+        """(n,) px, how far off each corner is, in the best of the turns after which the board looks the same."""
         columns, rows = self.board.grid
         ids = np.arange(columns * rows).reshape(rows, columns)
         turns = [0]
         if self.board.symmetric:
             turns = [0, 1, 2, 3] if columns == rows and columns % 2 == 0 else [0, 2]
         alike = [self.pixels[np.rot90(ids, n).ravel()[detection.ids]] for n in turns]
-        return min(float(np.linalg.norm(detection.pixels - where, axis=1).max(initial=0)) for where in alike)
+        return min((np.linalg.norm(detection.pixels - where, axis=1) for where in alike), key=np.sum)

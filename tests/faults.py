@@ -27,7 +27,19 @@ from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Look
 from opencsp_calib.registry import installed
 
-__all__ = ["FAULTS", "NAMES", "SEALED", "STEPS", "Kind", "damaged", "failing", "kinds", "many_writers", "odd_name"]
+__all__ = [
+    "FAULTS",
+    "NAMES",
+    "SEALED",
+    "STEPS",
+    "Kind",
+    "damaged",
+    "failing",
+    "kinds",
+    "many_writers",
+    "odd_name",
+    "on_a_small_disk",
+]
 
 BOARD = Checkerboard(5, 4, 0.05)
 RNG = np.random.default_rng(5)
@@ -116,8 +128,8 @@ def damaged(kind: Kind, folder: Path, seed: int) -> str:
         return f"{kind.name}, seed {seed}: {error!r}"
 
 
-def failing(kind: Kind, folder: Path, step: str, fault: BaseException, nth: int = 1) -> str:
-    """The nth call of a step of writing fails: what was there stays, nothing is left over, the error is ours."""
+def failing(kind: Kind, folder: Path, step: str, fault: BaseException) -> str:
+    """A step of writing fails when it is taken first: what was there stays, nothing is left over, the error is ours."""
     calls = 0
     kind.write(folder / kind.file, 0)
     module, _, function = step.partition(".")
@@ -126,12 +138,13 @@ def failing(kind: Kind, folder: Path, step: str, fault: BaseException, nth: int 
     def fail(*arguments: Any, **options: Any) -> Any:
         nonlocal calls
         calls += 1
-        if calls == nth:
+        if calls == 1:
             raise fault
         return original(*arguments, **options)
 
     with mock.patch(step, fail):
-        return _written_over(kind, folder, f"{step} {fault!r}")
+        found = _written_over(kind, folder, f"{step} {fault!r}")
+    return found if calls else f"{kind.name}: {step} is no step of writing it"
 
 
 def on_a_small_disk(kind: Kind, folder: Path, limit: int) -> str:

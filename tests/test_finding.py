@@ -38,16 +38,6 @@ def processed(grey: Floats, sharpening: float, quality: int) -> Floats:
     return np.asarray(cv2.imdecode(file, cv2.IMREAD_GRAYSCALE))
 
 
-def off_px(photograph: Photograph, detection: Detection) -> Floats:
-    """(n,) px, in the best of the turns after which the board looks the same."""
-    columns, rows = photograph.board.grid
-    ids = np.arange(columns * rows).reshape(rows, columns)
-    alike = isinstance(photograph.board, Checkerboard)
-    turns = ([0, 1, 2, 3] if columns == rows else [0, 2]) if alike else [0]
-    places = [photograph.pixels[np.rot90(ids, n).ravel()[detection.ids]] for n in turns]
-    return min((np.linalg.norm(detection.pixels - p, axis=1) for p in places), key=lambda d: float(np.median(d)))
-
-
 @pytest.mark.parametrize("board", [BOARD, CHARUCO], ids=["checkerboard", "charuco"])
 @pytest.mark.parametrize("period_px", [2.1, 3.3, 7.0])
 def test_a_screen_with_moire(board: Board, period_px: float) -> None:
@@ -57,7 +47,7 @@ def test_a_screen_with_moire(board: Board, period_px: float) -> None:
     pixels = np.clip(photograph.image.pixels * (1 + 0.25 * waves), 0, 255).astype(np.uint8)
     detection = found(Image("screen", pixels), board)
     assert len(detection) > 0.9 * len(board.points)
-    assert off_px(photograph, detection).max() < 0.1
+    assert photograph.off_px(detection).max() < 0.1
 
 
 @pytest.mark.parametrize("board", [BOARD, CHARUCO], ids=["checkerboard", "charuco"])
@@ -69,7 +59,7 @@ def test_half_a_board_covered_by_something_straight(board: Board) -> None:
     left = photograph.pixels[:, 0] - 340
     assert set(detection.ids) <= set(np.flatnonzero(left > -1))
     assert len(detection) >= 0.8 * (left > 30).sum()
-    assert off_px(photograph, detection).max() < 0.1
+    assert photograph.off_px(detection).max() < 0.1
 
 
 def test_two_corners_too_few_are_no_view() -> None:
@@ -86,9 +76,7 @@ UNIT = st.floats(0, 1)
 SPOT = st.builds(Spot, st.floats(0, SIZE[0]), st.floats(0, SIZE[1]), st.floats(2, 90), st.floats(0, 255))
 
 
-@settings(
-    max_examples=20,
-)
+@settings(max_examples=20)
 @given(
     grid=st.tuples(SIDES, SIDES),
     charuco=st.booleans(),
@@ -125,7 +113,7 @@ def test_whatever_is_accepted_is_where_it_says(
     detection = found(image, board)
     if len(detection):
         assert detection.covariance is not None
-        off = off_px(photograph, detection)
+        off = photograph.off_px(detection)
         stated = np.sqrt(np.trace(detection.covariance, axis1=1, axis2=2))
         assert np.median(off) < 0.2
         assert (off < np.maximum(0.3, 5 * stated)).all()

@@ -135,10 +135,10 @@ def test_resuming_needs_an_output(photographs: Path, capsys: pytest.CaptureFixtu
 
 
 def test_killed_and_resumed(small_world: SmallWorld, photographs: Path, looked_at, tmp_path: Path) -> None:
-    """The whole program, killed without warning several times: the same file in the end, and no image done twice."""
+    """The whole program, killed without warning twice: the same file in the end, and no image done twice."""
     folder = tmp_path / "images"
     folder.mkdir()
-    for index in range(24):  # the same twelve photographs, twice over, with another pixel in a corner of each
+    for index in range(24):  # the same twelve photographs, two of each, with another pixel in a corner
         pixels = read_image(find_images(photographs)[index % 12]).pixels.copy()
         pixels[0, 0] = index
         write_image(pixels, folder / f"{index:02d}.png")
@@ -150,7 +150,7 @@ def test_killed_and_resumed(small_world: SmallWorld, photographs: Path, looked_a
         process = subprocess.Popen([*command, "-o", str(output), "--resume"], stderr=subprocess.DEVNULL)
         wanted = (done[-1] if done else 0) + 3
         while process.poll() is None and not (journal.exists() and len(images_in(journal)) >= wanted):
-            time.sleep(0.002)
+            time.sleep(0.01)
         if process.poll() is None:
             os.kill(process.pid, getattr(signal, "SIGKILL", signal.SIGTERM))
         process.wait()

@@ -125,7 +125,8 @@ def test_dropping(seen: Observations) -> None:
     assert "its rms was" in without.observations.views[dropped[0]].problems[-1].message
     assert drop_above(first, 100.0, quick) is first
     limit = float(np.sort(first.view_rms_px)[-2])
-    assert len(drop_above(first, limit, quick).observations.used) <= 7
+    left = {view.image for view in drop_above(first, limit, quick).observations.used}
+    assert left <= {view.image for view in seen.views} - {seen.views[first.view_rms_px.argmax()].image}
     with pytest.raises(InputError, match="must be left"):
         drop_worst(first, 6, quick)
     with pytest.raises(InputError, match="must be left"):
@@ -219,7 +220,7 @@ def test_a_detector_of_ones_own_needs_no_plugin(photographs: Path) -> None:
 
 def test_a_solver_that_cannot_hold_the_pixel_aspect_is_not_made_to() -> None:
     """All views the same way up: square pixels would be assumed, which COLMAP cannot; then the aspect stays open."""
-    pytest.importorskip("pycolmap")
+    pytest.importorskip("pycolmap", reason="pip install 'opencsp-calib[colmap]'")
     board, camera = Checkerboard(9, 6, 0.1), demo_camera()
     poses = random_poses(board, camera, 12, 3, tilt_deg=(25, 45), roll_deg=(-5, 5), fill=(0.5, 0.9))
     seen = observe(camera, board, poses, noise_px=0.02, rng=3)

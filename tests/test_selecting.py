@@ -42,9 +42,8 @@ def sigma_px(calibration: Calibration) -> float:
 def test_chosen_views_tell_more_than_views_at_random(pool: tuple[Camera, Observations], selection: Selection) -> None:
     """By the uncertainty that the solution states, and by its distance from the truth."""
     truth, observations = pool
-    found = selection
-    assert (len(found.observations.used), found.of) == (COUNT, SIZE)
-    chosen = quick(found.observations)
+    assert (len(selection.observations.used), selection.of) == (COUNT, SIZE)
+    chosen = quick(selection.observations)
     rng = np.random.default_rng(0)
     names = [view.image for view in observations.used]
     by_chance = [quick(observations.keeping(rng.choice(names, COUNT, replace=False))) for _ in range(5)]
@@ -52,12 +51,11 @@ def test_chosen_views_tell_more_than_views_at_random(pool: tuple[Camera, Observa
     errors = [compare(one.camera, truth).rms_px for one in by_chance]
     assert compare(chosen.camera, truth).rms_px < np.mean(errors)
     everything = quick(observations)
-    assert sigma_px(chosen) / sigma_px(everything) == pytest.approx(found.loss, rel=0.25)
+    assert sigma_px(chosen) / sigma_px(everything) == pytest.approx(selection.loss, rel=0.25)
 
 
 def test_the_others_are_dropped_with_the_reason(selection: Selection) -> None:
-    found = selection
-    dropped = [view for view in found.observations.views if view.status == "dropped"]
+    dropped = [view for view in selection.observations.views if view.status == "dropped"]
     assert len(dropped) == SIZE - COUNT
     assert {view.problems[-1].code for view in dropped} == {"not-selected"}
     assert f"{COUNT} of {SIZE}" in dropped[0].problems[-1].message
