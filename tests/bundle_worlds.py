@@ -1,4 +1,4 @@
-"""Small worlds for the tests of ``bundle``: a board, views of it, corners changed, moved and left out."""
+"""Solving by ``bundle``, and small worlds for its tests: a board, views of it, corners changed, moved and left out."""
 
 from dataclasses import replace
 

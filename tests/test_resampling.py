@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from opencsp_calib_bundle.solver import BundleSolver
+from bundle_worlds import solved
 
-from opencsp_calib import Calibration, Checkerboard, InputError, Observations, SolveOptions
+from opencsp_calib import Checkerboard, InputError, Observations
 from opencsp_calib.comparison import compare
 from opencsp_calib.resampling import (
     compare_halves,
@@ -26,10 +26,6 @@ CAMERA = demo_camera()
 def world(views: int, bow_m: float = 0.0, noise_px: float = 0.05) -> Observations:
     true = bowed(BOARD, bow_m)
     return observe(CAMERA, true, seed_poses(BOARD, CAMERA, views, 1), noise_px=noise_px, rng=2, nominal=BOARD)
-
-
-def solved(observations: Observations, **options: object) -> Calibration:
-    return BundleSolver().solve(observations, "opencv4", SolveOptions(**options))  # type: ignore[arg-type]
 
 
 def names(observations: Observations) -> list[str]:
