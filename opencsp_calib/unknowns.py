@@ -13,7 +13,7 @@ from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.rotations import rotation_matrices, rotation_vectors
 
-__all__ = ["Estimate", "Unknowns", "warp_basis"]
+__all__ = ["Estimate", "Unknowns", "camera_basis", "warp_basis"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +93,8 @@ class Unknowns:
     @classmethod
     def of(cls, lens: LensModel, board: Board, corners: Ids, options: SolveOptions) -> "Unknowns":
         """What the options ask for, with the corners that can be solved for where the board's shape is free."""
-        size, count = len(lens.parameter_names), len(board.points)
-        camera = np.eye(size)
-        if options.pixel_aspect is not None:
-            camera[1, 0] = options.pixel_aspect
-            camera = np.delete(camera, 1, axis=1)
-        warp = warp_basis(board) if options.board_shape == "warp" else np.zeros((count, 3, 0))
+        camera = camera_basis(len(lens.parameter_names), options.pixel_aspect)
+        warp = warp_basis(board) if options.board_shape == "warp" else np.zeros((len(board.points), 3, 0))
         free = options.board_shape == "free"
         return cls(camera, warp, corners if free else np.empty(0, dtype=np.int64))
 
@@ -110,6 +106,15 @@ class Unknowns:
     def shared(self) -> int:
         """M, the number of unknowns that all views share."""
         return int(self.camera.shape[1] + self.warp.shape[2])
+
+
+def camera_basis(count: int, pixel_aspect: float | None) -> Matrix:
+    """(P, Q) how P parameters of a camera follow from its unknowns: with fy/fx held, one column for both."""
+    basis = np.eye(count)
+    if pixel_aspect is None:
+        return basis
+    basis[1, 0] = pixel_aspect
+    return np.delete(basis, 1, axis=1)
 
 
 def warp_basis(board: Board) -> Floats:

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Matrix, Params
+from opencsp_calib.unknowns import camera_basis
 
 __all__ = ["Solution", "finish"]
 
@@ -91,7 +92,7 @@ def finish(
     pixel_aspect : float, optional
         fy / fx, where it is held.
     """
-    free, numbers = _free(len(found.params), pixel_aspect), 2 * sum(len(view) for view in pixels)
+    free, numbers = camera_basis(len(found.params), pixel_aspect), 2 * sum(len(view) for view in pixels)
 
     def at(solution: Solution) -> _Place:
         with np.errstate(all="ignore"):  # what OpenCV found may be wild
@@ -138,15 +139,6 @@ def _better(there: _Place, here: _Place) -> bool:
     """Whether the sum of squares is lower, or there is less to gain and it is the same but for rounding."""
     lower = there.cost < here.cost * (1.0 - ROUNDING)
     return lower or (there.promised < here.promised and there.cost <= here.cost * (1.0 + ROUNDING))
-
-
-def _free(count: int, pixel_aspect: float | None) -> Matrix:
-    """(P, Q) what the parameters may do."""
-    free = np.eye(count)
-    if pixel_aspect is None:
-        return free
-    free[1, 0] = pixel_aspect
-    return np.delete(free, 1, axis=1)
 
 
 def _at(solution: Solution, points: Sequence[Floats], pixels: Sequence[Floats], free: Matrix) -> _Place:
