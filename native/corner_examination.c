@@ -71,6 +71,11 @@ typedef struct {
     int64_t first_row, last_row, first_column, last_column;
 } Picture;
 
+/* Where a pixel so far from the corner is, from the picture's edge on. */
+static int64_t place(float distance, double corner, int64_t edge) {
+    return (int64_t)floor(distance + corner + 0.5) - edge;
+}
+
 static void lay_out(const double *p, const Window *window, Picture *picture) {
     int64_t left = (int64_t)floor(p[AT_X]) - SIDE / 2, top = (int64_t)floor(p[AT_Y]) - SIDE / 2;
     for (int row = 0; row < SIDE; row++)
@@ -78,19 +83,21 @@ static void lay_out(const double *p, const Window *window, Picture *picture) {
             picture->residual[row][column] = NAN;
     picture->first_row = picture->first_column = SIDE;
     picture->last_row = picture->last_column = 0;
-    for (int k = 0; k < window->count; k++) {
-        int64_t row = (int64_t)floor(window->y[k] + p[AT_Y] + 0.5) - top;
-        int64_t column = (int64_t)floor(window->x[k] + p[AT_X] + 0.5) - left;
-        if (row < picture->first_row)
-            picture->first_row = row;
-        if (row > picture->last_row)
-            picture->last_row = row;
+    for (int start = 0, end = 0; start < window->count; start = end) {
+        while (end < window->count && window->y[end] == window->y[start])
+            end++;
+        int64_t row = place(window->y[start], p[AT_Y], top), column = place(window->x[start], p[AT_X], left);
+        const float *root = window->column[ROOT] + start, *residual = window->column[RESIDUAL] + start;
+        float *here = picture->residual[row] + column;
+        for (int k = 0; k < end - start; k++)
+            here[k] = root[k] > 0.999f ? residual[k] : NAN;
+        if (picture->first_row == SIDE)
+            picture->first_row = row; /* rows come from the top down */
+        picture->last_row = row;
         if (column < picture->first_column)
             picture->first_column = column;
-        if (column > picture->last_column)
-            picture->last_column = column;
-        if (window->column[ROOT][k] > 0.999)
-            picture->residual[row][column] = window->column[RESIDUAL][k];
+        if (column + end - start - 1 > picture->last_column)
+            picture->last_column = column + end - start - 1;
     }
 }
 
