@@ -109,7 +109,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as temporary:
         root = Path(temporary)
         python = pinned_python(root / "pinned")
-        for count, times in ((50, 4), (200, 1)):
+        for count, times in ((50, 4), (200, 2)):
             photographs(root / str(count), count, demo_camera())
             bare = ["-c", SEEDS_WAY, str(root / str(count))]
             commands = {
