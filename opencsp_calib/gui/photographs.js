@@ -1,14 +1,21 @@
 // The photographs' way in: a file input that is in the page from the start, and a place to drop files or folders.
-// They are sent at once, a few at a time, as they are.
+// They are sent at once, a few at a time, as they are. What is dropped beside the place is taken all the same: a browser
+// would leave the page for it.
 export default {
   template: `
-    <div class="drop" :class="{ over }" @dragover.prevent="over = true" @dragleave="over = false" @drop.prevent="drop">
+    <div class="drop" :class="{ over }">
       <input ref="input" type="file" multiple class="off-screen" tabindex="-1" aria-label="Photographs"
         accept="image/*,.tif,.tiff,.pgm,.pnm,.ppm,.bmp,.webp" @change="pick" />
       <slot />
     </div>`,
   data() {
     return { over: false };
+  },
+  mounted() {
+    for (const kind of ["dragover", "dragleave", "drop"]) window.addEventListener(kind, this[kind]);
+  },
+  unmounted() {
+    for (const kind of ["dragover", "dragleave", "drop"]) window.removeEventListener(kind, this[kind]);
   },
   methods: {
     open() {
@@ -19,8 +26,22 @@ export default {
       event.target.value = ""; // so that the same ones can be selected again
       this.send(files);
     },
+    concerned(event) {
+      return !event.defaultPrevented && event.dataTransfer.types.includes("Files"); // not over the place for a camera file
+    },
+    dragover(event) {
+      if (!this.concerned(event)) return;
+      event.preventDefault();
+      this.over = this.$el.checkVisibility();
+    },
+    dragleave() {
+      this.over = false;
+    },
     async drop(event) {
       this.over = false;
+      if (!this.concerned(event)) return;
+      event.preventDefault();
+      if (!this.$el.checkVisibility()) return;
       const entries = [...event.dataTransfer.items].map((item) => item.webkitGetAsEntry()).filter((entry) => entry);
       this.send((await Promise.all(entries.map((entry) => this.inside(entry)))).flat());
     },
