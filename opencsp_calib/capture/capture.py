@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from opencsp_calib.capture.folder import CaptureFolder
 from opencsp_calib.capture.learner import Learner
+from opencsp_calib.capture.learning import Study
 from opencsp_calib.capture.release import Release
 from opencsp_calib.coach import Knowledge, Moment, Preview, judge_moment
 from opencsp_calib.coach.knowledge import GOAL_PX
@@ -171,7 +172,7 @@ class Capture:
         return name
 
     def _begun(self, image: Image) -> Learner:
-        learner = Learner(self.search, image.size, self._range_m, self._goal_px)
+        learner = Learner(Study(self.search, image.size, self._range_m, self._goal_px))
         if self.folder.images:  # of a run before
             learner.know(self.folder.images)
             self._places = [view.detection for view in learner.wait().views]

@@ -13,28 +13,24 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from opencsp_calib.board import Board
-from opencsp_calib.coach import Knowledge, learn
+from opencsp_calib.capture.learning import Study
+from opencsp_calib.coach import Knowledge
 from opencsp_calib.errors import CalibError
-from opencsp_calib.looking import Search
 from opencsp_calib.processes import BACKGROUND, own_process
 
 __all__ = ["Learner"]
 
 
 class Learner:
-    """Learns from photographs, always from the latest state of the set; see `learning.Study`.
+    """Learns from photographs, always from the latest state of the set.
 
     Parameters
     ----------
-    search : Search
-    image_size : (int, int)
-    range_m, goal_px
-        See `opencsp_calib.coach.learn`.
+    study : Study
+        That looks at them and learns, in the other process.
     """
 
-    def __init__(self, search: Search, image_size: tuple[int, int], range_m: float | None, goal_px: float) -> None:
-        self._search = search
+    def __init__(self, study: Study) -> None:
         self._process = subprocess.Popen(  # noqa: S603  # our own module
             own_process("opencsp_calib.capture.learning", background=True),
             stdin=subprocess.PIPE,
@@ -45,13 +41,8 @@ class Learner:
         self._running: Future[Knowledge] | None = None
         self._wanted: tuple[Path, ...] = ()
         self._started: tuple[Path, ...] = ()
-        self.knowledge = learn(search.board, image_size, range_m=range_m, goal_px=goal_px)
-        self._tell((search, image_size, range_m, goal_px))
-
-    @property
-    def board(self) -> Board:
-        """That is looked for."""
-        return self._search.board
+        self.knowledge = study.knowledge
+        self._tell(study)
 
     @property
     def behind(self) -> bool:

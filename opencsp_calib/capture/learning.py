@@ -64,7 +64,7 @@ def main() -> None:
     asked, told = sys.stdin.buffer, answers("wb")
     copyreg.pickle(MappingProxyType, _pickled)
     with threadpool_limits(1), opencv_on_one_thread():
-        study = Study(*pickle.load(asked))  # noqa: S301  # from the process that started this one
+        study: Study = pickle.load(asked)  # noqa: S301  # from the process that started this one
         while True:
             try:
                 photographs = pickle.load(asked)  # noqa: S301

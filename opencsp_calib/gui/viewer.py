@@ -13,14 +13,12 @@ from nicegui.events import GenericEventArguments
 from opencsp_calib.detection import View
 from opencsp_calib.gui.routes import WHOLE_PX
 from opencsp_calib.gui.session import Session
+from opencsp_calib.report.photographs import enlargement
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
 
 __all__ = ["build"]
-
-ARROW = 0.02
-"""Length of an arrow as long as the rms, in widths of the image; as in the report."""
 
 
 class Photograph(Element, component="photograph.js"):
@@ -110,7 +108,7 @@ def _props(session: Session, view: View, *, with_arrows: bool) -> tuple[dict[str
     calibration = session.calibration
     if residuals is None or calibration is None or not with_arrows or len(residuals) != len(detection):
         return told, 0.0
-    enlarged = ARROW * width / max(calibration.rms_px, 1e-9)
+    enlarged = enlargement(calibration)
     told["arrows"] = [
         [round(float(dx), 3), round(float(dy), 3)] if np.isfinite(dx + dy) else [None, None]
         for dx, dy in residuals * enlarged

@@ -15,7 +15,7 @@ from opencsp_calib.detection import View
 from opencsp_calib.errors import CalibError
 from opencsp_calib.images import ImageFile, encode_thumbnail, read_image
 
-__all__ = ["photographs"]
+__all__ = ["enlargement", "photographs"]
 
 THUMBNAIL_PX = 480
 ARROW = 0.02  # of the image's width: how long the arrow of a residual as large as the rms is
@@ -32,13 +32,18 @@ def photographs(calibration: Calibration) -> Iterator[str]:
     places: Mapping[str, str] = calibration.provenance.get("images", {})
     used = [view.image for view in calibration.observations.used]
     residuals = dict(zip(used, calibration.residuals, strict=True))
-    enlarged = ARROW * calibration.camera.image_size[0] / max(calibration.rms_px, 1e-9)
+    enlarged = enlargement(calibration)
     with ThreadPoolExecutor() as pool:
         for first in range(0, len(views), TOGETHER):
             some = views[first : first + TOGETHER]
             thumbnails = pool.map(lambda view: _thumbnail(view, places.get(view.image)), some)
             for view, thumbnail in zip(some, thumbnails, strict=True):
                 yield _figure(view, thumbnail, calibration, residuals.get(view.image), enlarged)
+
+
+def enlargement(calibration: Calibration) -> float:
+    """How many times as long as they are residuals are drawn over a photograph."""
+    return ARROW * calibration.camera.image_size[0] / max(calibration.rms_px, 1e-9)
 
 
 def _thumbnail(view: View, place: str | None) -> str:

@@ -10,7 +10,7 @@ from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.available import missing_opencv
 from opencsp_calib_opencv.charuco_explaining import why_no_charuco
-from opencsp_calib_opencv.explaining import emptiness
+from opencsp_calib_opencv.explaining import emptiness, incomplete
 from opencsp_calib_opencv.grid import known, square_height
 from opencsp_calib_opencv.growth import belongs, filled
 from opencsp_calib_opencv.layout import Layout, laid_out, read_board
@@ -64,9 +64,7 @@ class CharucoDetector:
             return Detection.nothing(emptiness(image) or why_no_charuco(level, board, quads, markers))
         grid = _corners(level, board, layout)
         ids = np.flatnonzero(known(grid))
-        missing = len(board.points) - len(ids)
-        reason = f"{missing} of {len(board.points)} corners are out of view, covered or too unclear" if missing else ""
-        return Detection(ids, level.to_image(grid.reshape(-1, 2)[ids]), reason=reason)
+        return Detection(ids, level.to_image(grid.reshape(-1, 2)[ids]), reason=incomplete(len(ids), board))
 
 
 def _corners(level: Level, board: CharucoBoard, layout: Layout) -> Floats:

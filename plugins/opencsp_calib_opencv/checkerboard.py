@@ -2,13 +2,12 @@
 
 from typing import Literal
 
-from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
 from opencsp_calib_opencv.available import missing_opencv
-from opencsp_calib_opencv.explaining import emptiness, not_placed, two_boards
-from opencsp_calib_opencv.grid import known
+from opencsp_calib_opencv.explaining import emptiness, incomplete, not_placed, two_boards
+from opencsp_calib_opencv.grid import count
 from opencsp_calib_opencv.levels import levels
 from opencsp_calib_opencv.margins import sides_seen
 from opencsp_calib_opencv.placing import placed
@@ -59,21 +58,12 @@ class CheckerboardDetector:
                 return Detection.nothing(two_boards(board))
             if fits and len(fits[0].ids) > len(best):
                 ids, pixels = fits[0].ids, level.to_image(fits[0].pixels)
-                best = Detection(ids, pixels, reason=_incomplete(len(ids), board))
+                best = Detection(ids, pixels, reason=incomplete(len(ids), board))
             if len(best) == len(board.points):
                 break
-            if grids and (largest is None or _count(grids[0]) > _count(largest)):
+            if grids and (largest is None or count(grids[0]) > count(largest)):
                 largest, whole = grids[0], all(sides_seen(level.grey, grids[0]))
         if len(best):
             return best
         empty = emptiness(image)
         return Detection.nothing(empty) if empty else not_placed(board, largest, whole)
-
-
-def _incomplete(found: int, board: Board) -> str:
-    missing = len(board.points) - found
-    return f"{missing} of {len(board.points)} corners are out of view, covered or too unclear" if missing else ""
-
-
-def _count(grid: Floats) -> int:
-    return int(known(grid).sum())

@@ -1,4 +1,4 @@
-"""Why no board was found, in words that say what to do."""
+"""Why no board was found, or not all of it, in words that say what to do."""
 
 import numpy as np
 
@@ -6,9 +6,9 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
-from opencsp_calib_opencv.grid import known
+from opencsp_calib_opencv.grid import count
 
-__all__ = ["emptiness", "not_placed", "two_boards"]
+__all__ = ["emptiness", "incomplete", "not_placed", "two_boards"]
 
 SAMPLE_STEP = 7  # pixels: a hundredth of the image tells whether there is anything in it
 FLAT = 0.02  # of the image's range, from the 1st to the 99th percentile
@@ -28,6 +28,12 @@ def emptiness(image: Image) -> str | None:
     return "the image is blank: all of it is one grey"
 
 
+def incomplete(found: int, board: Board) -> str:
+    """Why there are no more corners than were found; empty where all were."""
+    missing = len(board.points) - found
+    return f"{missing} of {len(board.points)} corners are out of view, covered or too unclear" if missing else ""
+
+
 def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
     """Nothing, and what the largest grid of corners that was found means for somebody who looks for the board.
 
@@ -39,7 +45,7 @@ def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
         Whether a margin is seen all around it.
     """
     wanted = f"{board.columns}x{board.rows}"
-    if grid is None or known(grid).sum() < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
+    if grid is None or count(grid) < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
         return Detection.nothing(f"no {wanted} checkerboard was found")
     small, large = sorted(grid.shape[:2])
     least, most = sorted(board.grid)

@@ -4,12 +4,17 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Mask
 
-__all__ = ["height_between", "known", "mean_known", "padded", "predicted", "square_height", "steps", "trimmed"]
+__all__ = ["count", "height_between", "known", "mean_known", "padded", "predicted", "square_height", "steps", "trimmed"]
 
 
 def known(grid: Floats) -> Mask:
     """(m, n) whether there is a corner."""
     return np.asarray(~np.isnan(grid[..., 0]))
+
+
+def count(grid: Floats) -> int:
+    """How many corners there are."""
+    return int(known(grid).sum())
 
 
 def mean_known(one: Floats, other: Floats) -> Floats:

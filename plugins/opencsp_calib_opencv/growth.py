@@ -5,6 +5,7 @@ from numpy.typing import NDArray
 
 from opencsp_calib.arrays import Floats, Mask, Pixels
 from opencsp_calib_opencv.grid import (
+    count,
     height_between,
     known,
     mean_known,
@@ -50,12 +51,12 @@ def grown(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, longest: int
     """
     tree = Neighbours(saddles)
     for _ in range(MOST_ROUNDS):
-        size = known(grid).sum()
+        size = count(grid)
         if max(grid.shape[:2]) > longest:
             break
         for distance in (1, 2):
             grid = trimmed(_joined(grey, padded(grid, distance), tree, distance, RING))
-            if known(grid).sum() > size:
+            if count(grid) > size:
                 break
         else:
             break
@@ -70,7 +71,7 @@ def filled(grey: NDArray[np.float32], grid: Floats, saddles: Pixels, ring: float
     tree = Neighbours(saddles)
     for _ in range(MOST_ROUNDS):
         fuller = _joined(grey, grid, tree, 1, ring)
-        if known(fuller).sum() == known(grid).sum():
+        if count(fuller) == count(grid):
             break
         grid = fuller
     return grid

@@ -43,12 +43,12 @@ class Level:
         """(..., 2) pixels of this level as pixels of the photograph."""
         return (pixels + 0.5) * self.factor - 0.5
 
-    def eight_bit(self, *, inverted: bool = False) -> NDArray[np.uint8]:
-        """Sharp, from 0 to 255, stretched to the range between the darkest and brightest hundredths."""
+    def stretched(self, *, inverted: bool = False) -> NDArray[np.uint8]:
+        """`sharp` in 8 bits, stretched to the range between the darkest and brightest hundredths."""
         step = max(1, self.sharp.size // 100_000)
         dark, bright = np.percentile(self.sharp.ravel()[::step], [1, 99])
-        stretched = (self.sharp - dark) * (255 / max(bright - dark, 1e-3))
-        pixels = np.asarray(np.clip(stretched, 0, 255), dtype=np.uint8)
+        levels = (self.sharp - dark) * (255 / max(bright - dark, 1e-3))
+        pixels = np.asarray(np.clip(levels, 0, 255), dtype=np.uint8)
         return np.invert(pixels) if inverted else pixels
 
 

@@ -66,7 +66,7 @@ def found_quads(level: Level, *, inverted: bool) -> Floats | None:
     """(n, 4, 2) px, quadrilaterals that may be black (white) markers, clockwise; None where there are too many."""
     import cv2
 
-    pixels = level.eight_bit(inverted=inverted)
+    pixels = level.stretched(inverted=inverted)
     if _squares(pixels) > MOST_SQUARES:
         return None
     dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)

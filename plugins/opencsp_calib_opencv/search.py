@@ -2,7 +2,7 @@
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board
-from opencsp_calib_opencv.grid import known, trimmed
+from opencsp_calib_opencv.grid import count, known, trimmed
 from opencsp_calib_opencv.growth import grown, pruned
 from opencsp_calib_opencv.lattice import grids, links
 from opencsp_calib_opencv.levels import Level
@@ -26,7 +26,7 @@ def found_grids(level: Level, board: Board) -> list[Floats]:
     """
     saddles = saddle_pixels(level.grey, most=CLUTTER + 2 * len(board.points))
     corners = corner_like(level.grey, saddles)
-    seeds = sorted(grids(corners, links(level.grey, corners)), key=_count, reverse=True)
+    seeds = sorted(grids(corners, links(level.grey, corners)), key=count, reverse=True)
     longest = max(board.grid)
     found: list[Floats] = []
     for seed in seeds[:MOST_GRIDS]:
@@ -35,12 +35,12 @@ def found_grids(level: Level, board: Board) -> list[Floats]:
         grid = seed
         if max(seed.shape) <= MUCH_LONGER * longest:
             grid = pruned(level.grey, seed)
-            if _count(grid) >= FEWEST_CORNERS:
+            if count(grid) >= FEWEST_CORNERS:
                 whole = _is_whole(level, grid, board)
                 grid = trimmed(smooth_part(grid if whole else grown(level.grey, grid, saddles, longest)))
-        if _count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
+        if count(grid) >= FEWEST_CORNERS and not any(_overlap(grid, other) for other in found):
             found.append(grid)
-    return sorted(found, key=_count, reverse=True)
+    return sorted(found, key=count, reverse=True)
 
 
 def _is_whole(level: Level, grid: Floats, board: Board) -> bool:
@@ -52,7 +52,3 @@ def _is_whole(level: Level, grid: Floats, board: Board) -> bool:
 def _overlap(grid: Floats, other: Floats) -> bool:
     distance, _ = Neighbours(other[known(other)]).nearest(grid[known(grid)])
     return bool((distance < 1).mean() > 0.1)
-
-
-def _count(grid: Floats) -> int:
-    return int(known(grid).sum())
