@@ -1,7 +1,7 @@
 """Whether a usable OpenCV is installed here, without loading it."""
 
 import re
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 
 __all__ = ["missing_opencv"]
@@ -12,7 +12,7 @@ OLDEST = (4, 9)
 def missing_opencv() -> str | None:
     """One sentence naming what to install when there is no ``cv2`` from 4.9 on; None when there is."""
     install = "pip install 'opencsp-calib[opencv]'"
-    found = find_spec("cv2")
+    found = PathFinder.find_spec("cv2")  # not what is loaded: half of it, where another thread is about to load it
     if found is None:
         return f"it needs OpenCV: {install} (any package with cv2 from 4.9 on serves)"
     version = _version([Path(folder) for folder in found.submodule_search_locations or ()])

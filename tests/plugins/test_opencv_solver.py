@@ -1,6 +1,8 @@
 """The solver ``opencv`` against truth, against OpenCSP's stored result, and where OpenCV fails or stops short."""
 
+import sys
 from dataclasses import replace
+from types import ModuleType
 
 import numpy as np
 import opencsp_calib_opencv.solver as module
@@ -118,3 +120,9 @@ def test_it_says_so_when_opencv_stops_short(monkeypatch):
     short = solved(observations)
     assert remaining_sigmas(short) > 1.0
     assert [problem.code for problem in short.problems] == ["not-converged"]
+
+
+def test_it_is_there_while_another_thread_loads_it(monkeypatch):
+    """OpenCV's loader puts another module in its own place for a moment."""
+    monkeypatch.setitem(sys.modules, "cv2", ModuleType("cv2"))
+    assert OpenCVSolver().missing() is None
