@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from opencsp_calib import Camera, InputError
 from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.models.base import inverse_radius
 
 SIZE = (1626, 1236)
 PINHOLE = [1400.0, 1410.0, 830.0, 601.0]
@@ -186,3 +187,12 @@ def test_unproject_undoes_project_wherever_there_is_an_image(k: list, p: list, f
 def test_an_unknown_model_names_those_there_are() -> None:
     with pytest.raises(InputError, match=r"'opencv6'.*pinhole, opencv4, opencv5"):
         Camera("x", "opencv6", PINHOLE, SIZE)
+
+
+@pytest.mark.parametrize("slope", [0.01, 1.0, 20.0])
+def test_a_radius_is_found_however_far_the_lens_moves_it(slope: float) -> None:
+    """Newton's method starts from it, and mends much: only the start itself tells whether the search reaches it."""
+    radii = np.array([0.0, 1e-5, 0.3, 70.0])
+    found = inverse_radius(slope * radii, lambda radius: slope * radius, np.inf)
+    np.testing.assert_allclose(found, radii, rtol=1e-6, atol=1e-4)
+    assert inverse_radius(slope * radii, lambda radius: slope * radius, 2.0)[-1] == pytest.approx(2.0)
