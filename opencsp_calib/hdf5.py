@@ -124,6 +124,8 @@ def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
 
     path = Path(path)
     try:
+        if path.is_dir():
+            raise InputError(f"{path} is a folder, no camera or observations file")
         if not path.is_file():
             raise InputError(f"no such file: {path}")
         check_seal(path)

@@ -43,6 +43,7 @@ __all__ = [
 EXTENSIONS = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".bmp", ".pgm", ".pnm", ".ppm", ".webp")
 MAX_BYTES = 2**31
 MAX_NAME = 255  # characters
+MAX_FOLDERS = 5  # named in a message
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,10 @@ def _expanded(text: str) -> list[Path]:
     if path.is_dir():
         found = images_in(path)
         if not found:
-            raise InputError(f"the folder {path} has no image files ({', '.join(EXTENSIONS)})")
+            inside = [one.name for one in sorted(path.iterdir()) if one.is_dir() and _has_images(one)]
+            named = ", ".join([*inside[:MAX_FOLDERS], *["..."] * (len(inside) > MAX_FOLDERS)])
+            hint = f", but those in it have: name one of them ({named})" if inside else ""
+            raise InputError(f"the folder {path} has no image files ({', '.join(EXTENSIONS)}){hint}")
         return found
     if path.exists():
         return [path]
@@ -131,6 +135,13 @@ def images_in(folder: Path) -> list[Path]:
     """The image files of a folder by extension, sorted naturally; not hidden ones, such as files being written."""
     files = (path for path in folder.iterdir() if path.suffix.lower() in EXTENSIONS and not path.name.startswith("."))
     return sorted((path for path in files if path.is_file()), key=natural_order)
+
+
+def _has_images(folder: Path) -> bool:
+    try:
+        return bool(images_in(folder))
+    except OSError:  # not allowed to look into it
+        return False
 
 
 def natural_order(path: Path) -> list[tuple[int, str]]:

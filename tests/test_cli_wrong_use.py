@@ -82,11 +82,16 @@ def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, c
     np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
-@pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt"])
+@pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt", "camera.png", "camera.html"])
 def test_a_camera_file_is_not_named_like_another_format(name, tmp_path: Path, capsys) -> None:
     said = complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / name)
     assert "let its name end in .h5" in said
     assert "convert" in said
+
+
+def test_a_report_is_named_as_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in (["calibrate", tmp_path, "--board", SmallWorld.spec], ["validate", tmp_path]):
+        assert "let its name end in .html" in complaint(capsys, *command, "--report", tmp_path / "report.pdf")
 
 
 def test_no_board_anywhere(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -112,6 +117,7 @@ def test_files_that_are_not_there(photographs: Path, tmp_path: Path, capsys: pyt
         capsys, "calibrate", photographs, *board, "--report", tmp_path / "no" / "r.html"
     )
     assert "does not exist" in complaint(capsys, "show", tmp_path / "none.h5")
+    assert "is a folder" in complaint(capsys, "solve", photographs)
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")

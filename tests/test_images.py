@@ -91,6 +91,14 @@ def test_nothing_found_says_what(given: str, message: str, tmp_path: Path, monke
         find_images(given)
 
 
+def test_of_a_folder_with_images_in_its_folders_those_are_named(tmp_path: Path) -> None:
+    for name in ("left", "right", "notes"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / ("1.txt" if name == "notes" else "1.png")).write_bytes(b"x")
+    with pytest.raises(InputError, match=r"no image files .* name one of them \(left, right\)"):
+        find_images(tmp_path)
+
+
 def test_written_images_are_lossless(tmp_path: Path) -> None:
     write_image(RAMP, tmp_path / "w.png")
     np.testing.assert_array_equal(read(tmp_path / "w.png"), RAMP)

@@ -219,7 +219,7 @@ def _finish(
         if path:
             say(f"{what} saved: {path}")
     if not output:
-        say("nothing was saved; add -o camera.h5")
+        say("the camera was not saved; add -o camera.h5")
     if json:
         print_json(calibration_as_json(result, seconds, str(output) if output else None))
 

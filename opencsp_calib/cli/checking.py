@@ -9,6 +9,7 @@ from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize, camera_in
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud
+from opencsp_calib.cli.targets import check_targets
 from opencsp_calib.errors import FileFormatError, InputError
 
 if TYPE_CHECKING:
@@ -32,12 +33,10 @@ def validate(
     json: args.Json = False,
 ) -> None:
     """Let every solver, both halves of the views, and lens models from simple to rich answer the same question."""
-    from opencsp_calib.atomic import check_writable
     from opencsp_calib.report import write_validation
     from opencsp_calib.validate import validate as validated
 
-    if report:
-        check_writable(report)
+    check_targets(report=report)
     engines = _chosen(solvers)
     found = validated(_calibration(images, board, jobs), engines)
     _say_validation(found)

@@ -10,8 +10,10 @@ if TYPE_CHECKING:
 
 __all__ = ["check_not_input", "check_targets"]
 
+HTML = (".html", ".htm")
 
-def check_targets(output: Path | None, report: Path | None = None) -> None:
+
+def check_targets(output: Path | None = None, report: Path | None = None) -> None:
     """Before any work: whether its results can be written, and have names that say what they are."""
     from opencsp_calib.atomic import check_writable
     from opencsp_calib.hdf5 import EXTENSIONS
@@ -21,13 +23,17 @@ def check_targets(output: Path | None, report: Path | None = None) -> None:
             check_writable(path)
     if output and output.suffix.lower() not in ("", *EXTENSIONS):
         _check_no_other_format(output)
+    if report and report.suffix.lower() not in HTML:
+        raise InputError(f"{report}: a report is HTML; let its name end in .html")
 
 
 def _check_no_other_format(output: Path) -> None:
+    from opencsp_calib.images import EXTENSIONS as OF_IMAGES
     from opencsp_calib.registry import installed
 
     ending = output.suffix.lower()
     titles = [form.title for form in installed().camera_formats.values() if ending in form.extensions]
+    titles += ["an image"] * (ending in OF_IMAGES) + ["a report"] * (ending in HTML)
     if titles:
         raise InputError(
             f"{output} would be HDF5 under the name of something else ({', '.join(titles)}): let its name end in .h5; "

@@ -171,7 +171,8 @@ def pose_plot(calibration: Calibration) -> "Figure":
 
 def correlation_plot(calibration: Calibration) -> "Figure":
     """Which parameters can hardly be told apart: their correlations."""
-    figure, (axes,) = new_figure(5, 4.2)
+    figure, (axes,) = new_figure(5, 4.4)
+    axes.set_title("correlations")
     names = calibration.camera.lens.parameter_names
     values = correlations(calibration)
     shown = axes.imshow(values, cmap="RdBu_r", vmin=-1, vmax=1)
