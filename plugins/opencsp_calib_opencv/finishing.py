@@ -8,10 +8,13 @@ orthogonal triangulation of its own rows, which keeps all digits, and the triang
 another. Source: Björck, "Numerical methods for least squares problems", 1996.
 
 Where such a step leads too far, each pose is fitted to the moved camera; if that is not enough the camera's step is
-damped (Levenberg and Marquardt). The poses follow at once: damped with it they would bend the valley.
+damped (Levenberg and Marquardt). The poses follow at once: damped with it they would bend the valley. The damping is
+for what can hardly be told apart, such as a rational lens model's numerator and denominator for a lens that needs
+neither: it begins at the least squared singular value, below which it does nothing, and a step that has to be taken
+back in part asks for more of it, for there the residuals' own curvature counts.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,15 +24,16 @@ from opencsp_calib.unknowns import camera_basis
 
 __all__ = ["Solution", "finish"]
 
-STEPS = 80  # with noise and a rational lens each step leaves up to half of what is missing
+STEPS = 80
 ENOUGH = 1e-16  # of the sum of squares left to gain: some 1e-6 sigmas
 NEAR = 1e-12  # variances left to gain: where nothing but rounding keeps a step from leading on
-CLOSE = 1e-2  # likewise: where a step that leads too far is halved
-HALVINGS = 3
+CLOSE = 1e-2  # likewise: from where on poses need no fit of their own
 ROUNDING = 1e-9  # of the sum of squares: near the minimum it may rise by that
 FARTHEST = 10.0  # sigmas; from farther away OpenCV has found something else
 EXACT_PX = 1e-3  # no corner is located better: pixels without noise are judged as if they had this
-LEAST_DAMPING, MOST_DAMPING = 1e-12, 1.0
+QUICK = 0.1  # of what was left to gain: the damping that leaves less than that is kept
+MORE, LESS = 5.0, 0.2  # times the damping
+LEAST_DAMPING, MOST_DAMPING = 1e-20, 1.0
 POSE = 6  # of a view: OpenCV's first columns
 
 
@@ -74,6 +78,17 @@ class _Place(NamedTuple):
         """How much lower the sum of squares is said to get."""
         return float((self.whole[:-1, -1] ** 2).sum())
 
+    @property
+    def scale(self) -> Params:
+        """(Q,) what brings the camera's unknowns to one size: coefficients and focal lengths differ by orders."""
+        return np.asarray(1.0 / np.linalg.norm(self.whole[:-1, :-1], axis=0))
+
+    @property
+    def least_damping(self) -> float:
+        """What first does anything to a step, for those unknowns that can hardly be told apart."""
+        least = np.linalg.svd(self.whole[:-1, :-1] * self.scale, compute_uv=False)[-1]
+        return max(float(least**2), LEAST_DAMPING)
+
 
 def finish(
     found: Solution, points: Sequence[Floats], pixels: Sequence[Floats], pixel_aspect: float | None = None
@@ -94,45 +109,42 @@ def finish(
     """
     free, numbers = camera_basis(len(found.params), pixel_aspect), 2 * sum(len(view) for view in pixels)
 
-    def at(solution: Solution) -> _Place:
+    def at(solution: Solution) -> _Place | None:
         with np.errstate(all="ignore"):  # what OpenCV found may be wild
-            return _at(solution, points, pixels, free)
+            try:
+                return _at(solution, points, pixels, free)
+            except np.linalg.LinAlgError:
+                return None
 
-    try:
-        here = at(found)
-    except np.linalg.LinAlgError:
+    here, damping = at(found), 0.0
+    if here is None:
         return found
-    variance, damping = max(here.cost / numbers, EXACT_PX**2), 0.0
+    variance = max(here.cost / numbers, EXACT_PX**2)
     if not here.promised < FARTHEST**2 * variance:  # NaN is not
         return found
     for _ in range(STEPS):
         if here.promised <= ENOUGH * here.cost:
-            return _stepped(here, free, 0.0)
-        further = _further(here, at, free, damping, close=here.promised < CLOSE * variance)
-        if further is not None:
-            here, damping = further, 0.1 * damping if damping > LEAST_DAMPING else 0.0
+            return _moved(here, _camera_step(here, 0.0), free)
+        step = _camera_step(here, damping)
+        there = at(_moved(here, step, free))
+        if there and not _better(there, here) and here.promised > CLOSE * variance:
+            there = at(_moved(there, np.zeros(len(step)), free))
+        if there and _better(there, here):
+            here, damping = there, _next_damping(damping, here, there, step)
         elif here.promised < NEAR * variance or damping > MOST_DAMPING:
             break
         else:
-            damping = max(10.0 * damping, LEAST_DAMPING)
+            damping = max(MORE * damping, here.least_damping)
     return here.solution
 
 
-def _further(
-    here: _Place, at: Callable[[Solution], _Place], free: Matrix, damping: float, *, close: bool
-) -> _Place | None:
-    """Where a step leads, or half of it, or all of it and then one of the poses alone; None where neither is better."""
-    try:
-        there = at(_stepped(here, free, damping))
-        for _ in range(HALVINGS if close else 0):
-            if _better(there, here):
-                break
-            there = at(Solution(*(0.5 * (one + two) for one, two in zip(here.solution, there.solution, strict=True))))
-        if not _better(there, here) and not close:
-            there = at(_moved(there, np.zeros(free.shape[1]), free))
-    except np.linalg.LinAlgError:
-        return None
-    return there if _better(there, here) else None
+def _next_damping(damping: float, here: _Place, there: _Place, step: Params) -> float:
+    """More where the next step leads back, less where it leads on; as it is where steps get short quickly."""
+    if there.promised < QUICK * here.promised:
+        return damping
+    if (there.whole[:-1, :-1] @ step) @ there.whole[:-1, -1] < 0.0:
+        return max(MORE * damping, there.least_damping)
+    return LESS * damping if damping > LESS * there.least_damping else 0.0
 
 
 def _better(there: _Place, here: _Place) -> bool:
@@ -148,14 +160,16 @@ def _at(solution: Solution, points: Sequence[Floats], pixels: Sequence[Floats], 
     return _Place(solution, triangles, whole, float((triangles[:, :, -1] ** 2).sum()))
 
 
-def _stepped(here: _Place, free: Matrix, damping: float) -> Solution:
-    """Gauss and Newton's step, the camera's part of it damped."""
-    size = free.shape[1]
-    scale = 1.0 / np.linalg.norm(here.whole[:, :size], axis=0)  # coefficients and focal lengths differ by orders
-    scaled = here.whole * np.append(scale, 1.0)
+def _camera_step(here: _Place, damping: float) -> Params:
+    """(Q,) Gauss and Newton's step of the camera, damped; NaN where there is none."""
+    size = here.whole.shape[1] - 1
+    scaled = here.whole * np.append(here.scale, 1.0)
     if damping:
         scaled = _triangle(np.vstack([scaled, np.sqrt(damping) * np.eye(size, size + 1)]))
-    return _moved(here, scale * np.linalg.solve(scaled[:size, :size], scaled[:size, size]), free)
+    try:
+        return np.asarray(here.scale * np.linalg.solve(scaled[:size, :size], scaled[:size, size]))
+    except np.linalg.LinAlgError:
+        return np.full(size, np.nan)
 
 
 def _moved(here: _Place, camera: Params, free: Matrix) -> Solution:
