@@ -54,9 +54,14 @@ class Factorisation(ABC):
     @property
     def shared_covariance(self) -> Matrix:
         """(M, M) inverse of the shared unknowns' information; multiply by s² for their covariance."""
+        half = np.linalg.inv(self.shared_root)
+        return np.asarray(half @ half.T)
+
+    @property
+    def shared_root(self) -> Matrix:
+        """(M, M) upper triangular R, with RᵀR the information of the shared unknowns, all else marginalised."""
         shared = self.equations.unknowns.shared
-        half = np.linalg.inv(np.tril(self.root.lower[-shared:, -shared:])) * self.scale[-shared:]
-        return np.asarray(half.T @ half)
+        return np.asarray(np.tril(self.root.lower[-shared:, -shared:]).T / self.scale[-shared:])
 
     @property
     def camera_covariance(self) -> Matrix:
@@ -68,6 +73,26 @@ class Factorisation(ABC):
     @abstractmethod
     def newton_step(self) -> Parts:
         """By how much the unknowns move to where the sum of squares is least, as far as it is a quadratic form."""
+
+    def following(self, shared: Floats) -> Parts:
+        """The step of corners and poses to where the sum of squares is least after a given one (M,) of the shared."""
+        newton = self.step_without_poses()
+        pulled = self.solve_without_poses(np.eye(len(newton), len(shared)))
+        lacking = np.linalg.solve(pulled[: len(shared)], newton[: len(shared)] - shared)
+        corners = (newton - pulled @ lacking)[len(shared) :].reshape(CORNER, -1)
+        return (
+            shared,
+            corners.T,
+            self._poses_after(shared, corners, np.linalg.inv(np.linalg.cholesky(self.equations.pose))),
+        )
+
+    def _poses_after(self, shared: Floats, corners: Floats, inverse_roots: Floats) -> Floats:
+        """(V, 6) of the poses, by the inverse roots of their blocks, where the others' step is given: (M,), (3, C)."""
+        pose = -self.equations.pose_gradient - shared @ self.equations.shared_pose
+        for rows in self.equations.rows():
+            moved = (rows.corner * corners[:, rows.columns]).sum(axis=1)
+            pose[rows.view] -= (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
+        return np.asarray((inverse_roots.transpose(0, 2, 1) @ (inverse_roots @ pose[:, :, None]))[:, :, 0])
 
     @abstractmethod
     def step_without_poses(self) -> Floats:
@@ -191,14 +216,9 @@ class CornersKept(Factorisation):
 
     def newton_step(self) -> Parts:
         """See `Factorisation.newton_step`."""
-        equations, roots = self.equations, self.inverse_roots
-        shared, corners = np.split(self.step_without_poses(), [equations.unknowns.shared])
-        corners = corners.reshape(CORNER, len(equations.corner))
-        pose = -equations.pose_gradient - shared @ equations.shared_pose
-        for rows in equations.rows():
-            moved = (rows.corner * corners[:, rows.columns]).sum(axis=1)
-            pose[rows.view] -= (rows.pose @ moved[:, :, None]).sum(axis=0)[:, 0]
-        return shared, corners.T, (roots.transpose(0, 2, 1) @ (roots @ pose[:, :, None]))[:, :, 0]
+        shared, corners = np.split(self.step_without_poses(), [self.equations.unknowns.shared])
+        corners = corners.reshape(CORNER, -1)
+        return shared, corners.T, self._poses_after(shared, corners, self.inverse_roots)
 
     def step_without_poses(self) -> Floats:
         """See `Factorisation.step_without_poses`."""

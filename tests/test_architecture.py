@@ -22,7 +22,7 @@ TIERS = (
     "image image_bytes detection options",
     "view_json typed",
     "calibration",
-    "images undistortion corner_table unknowns jacobian triangular schur leaving_out leverage normal_equations subpix",
+    "images undistortion corner_table unknowns valley jacobian triangular schur leaving_out leverage normal_equations subpix",
     "corner_kernel corner_grid corner_windows corner_fit corner_judgement corners",
     "quality photograph comparison projection_sigma information uncertainty hdf5 hdf5_calibration opencsp",
     "drawing board_file",

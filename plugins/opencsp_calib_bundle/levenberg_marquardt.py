@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opencsp_calib.arrays import Matrix, Params
 from opencsp_calib.corner_table import CornerTable
 from opencsp_calib.models import LensModel
 from opencsp_calib.normal_equations import NormalEquations, Parts, linearise, well_conditioned
 from opencsp_calib.schur import Factorisation, factorise
 from opencsp_calib.unknowns import Estimate, Unknowns
-from opencsp_calib_bundle.extrapolation import extrapolated
+from opencsp_calib.valley import arrived, lowest
 
 __all__ = ["Minimum", "minimise"]
 
@@ -31,7 +32,6 @@ MAX_STEPS = 200
 MAX_DAMPING = 1e12
 FIRST_DAMPING = 1e-4
 LEAST_DAMPING = 1e-16
-VALLEY_STEPS = 30
 POLISHES = 8  # steps below what the cost can show: more are noise, where unknowns can hardly be told apart
 GROWTH = 10.0  # of the damping after a step that fails, then 20, 40 and so on
 
@@ -92,44 +92,69 @@ def minimise(
         return _descended(lens, table, start, here, TO_THE_END, LEAST_DAMPING)
     # along a curved valley damping must hold back each unknown, not combinations of them that are alike
     near = _descended(lens, table, start, here, NEAR, NEAR)
-    combined = linearise(lens, table, near.estimate, well_conditioned(near.equations))
-    end = _along_valley(lens, table, near.estimate, combined)
+    combined = well_conditioned(near.equations)
+    end = _along_valley(lens, table, near.estimate, unknowns, combined)
     return end if end.converged else _descended(lens, table, end.estimate, end.equations, TO_THE_END, LEAST_DAMPING)
 
 
-def _along_valley(lens: LensModel, table: CornerTable, start: Estimate, equations: NormalEquations) -> Minimum:
-    """The last way to a minimum that Newton's steps by JᵀJ alone approach slowly, or swing about; see `extrapolated`.
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """An estimate in a valley, the equations there and Newton's step, by unknowns combined to be told apart.
 
-    Where unknowns can hardly be told apart, the curvature of the residuals is no longer small beside JᵀJ. The place
-    with the least promise left is taken, for the cost is flat to the last digit; never one where it has risen.
+    Parameters
+    ----------
+    estimate : Estimate
+    equations : NormalEquations
+    step : _Step
+    combined : (M, M)
+        The shared unknowns before they were combined, by those they are combined to.
     """
-    try:
-        sigmas = factorise(equations).shared_covariance
-    except np.linalg.LinAlgError:
-        return Minimum(start, equations, converged=False)
-    unknowns, limit = equations.unknowns, equations.cost * (1.0 + ENOUGH)
-    estimate, best, least = start, Minimum(start, equations, converged=False), np.inf
-    walked, steps = [np.zeros(sum(_sizes(equations)))], []
-    for _ in range(VALLEY_STEPS):
-        step = _step(equations, LEAST_DAMPING)
-        if step is None or not equations.cost <= limit:  # NaN is not
-            break
-        if step.promised < least:
-            least = step.promised
-            best = Minimum(estimate, equations, least <= TO_THE_END * equations.cost, step.factor)
-        if best.converged:
-            break
-        steps.append(np.concatenate([part.ravel() for part in step.parts]))
-        walked.append(extrapolated(walked, steps, sigmas))
-        moved = np.split(walked[-1], np.cumsum(_sizes(equations))[:-1])
-        estimate = start.moved(unknowns, moved[0], moved[1].reshape(-1, 3), moved[2].reshape(-1, 6))
+
+    estimate: Estimate
+    equations: NormalEquations
+    step: "_Step"
+    combined: Matrix
+
+    @property
+    def cost(self) -> float:
+        return self.equations.cost
+
+    @property
+    def promised(self) -> float:
+        return self.step.promised
+
+    @property
+    def triangle(self) -> Matrix:
+        """See `opencsp_calib.valley.Place`; by the unknowns as they were, since each is to be held back."""
+        root = self.step.factor.shared_root
+        left = root @ self.step.parts[0]
+        rows = np.linalg.solve(self.combined.T, root.T).T
+        return np.asarray(np.linalg.qr(np.pad(np.column_stack([rows, left]), ((0, 1), (0, 0))), mode="r"))
+
+    def after(self, step: Params) -> Estimate:
+        """Where a step of the shared unknowns (M,) as they were leads, poses and corners following."""
+        parts = self.step.factor.following(np.asarray(np.linalg.solve(self.combined, step), dtype=np.float64))
+        return self.estimate.moved(self.equations.unknowns, *parts)
+
+
+def _along_valley(lens: LensModel, table: CornerTable, near: Estimate, before: Unknowns, unknowns: Unknowns) -> Minimum:
+    """The last way, where unknowns can hardly be told apart; see `opencsp_calib.valley`."""
+    cameras = before.camera.shape[1]
+    combined = np.eye(before.shared)
+    combined[:cameras, :cameras] = np.linalg.lstsq(before.camera, unknowns.camera, rcond=None)[0]
+
+    def at(estimate: Estimate) -> _Place | None:
         with np.errstate(all="ignore"):  # as in `_after`
             equations = linearise(lens, table, estimate, unknowns)
-    return best
+            step = _step(equations, LEAST_DAMPING)
+        return _Place(estimate, equations, step, combined) if step else None
 
-
-def _sizes(equations: NormalEquations) -> tuple[int, int, int]:
-    return equations.unknowns.shared, 3 * len(equations.unknowns.corners), equations.pose_gradient.size
+    start = at(near)
+    if start is None:
+        return Minimum(near, linearise(lens, table, near, before), converged=False)
+    end = lowest(start, lambda here, step: at(here.after(step)), start.cost / start.equations.numbers)
+    last = end.estimate.moved(unknowns, *end.step.parts) if arrived(end) else end.estimate
+    return Minimum(last, end.equations, end.promised <= ENOUGH * end.cost, end.step.factor)
 
 
 def _descended(
