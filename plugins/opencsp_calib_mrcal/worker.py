@@ -11,6 +11,18 @@ if __name__ == "__main__":
 NO_MRCAL = 3  # exit status
 PLAIN = {"do_apply_outlier_rejection": False, "do_optimize_calobject_warp": False}
 
+RATIONAL = ("LENSMODEL_OPENCV8", "LENSMODEL_OPENCV12")
+ENOUGH = 1e-16  # of the sum of squares left to gain: some 1e-6 sigmas
+NEAR = 1e-12  # variances left to gain: where nothing but rounding keeps a step from leading on
+FARTHEST = 10.0  # sigmas; from farther away mrcal has found something else
+EXACT_PX = 1e-3  # no corner is located better: pixels without noise are judged as if they had this
+ROUNDING = 1e-9  # of the sum of squares: near the minimum it may rise by that
+CLOSE = 1e-2  # variances left to gain: from where on poses need no fit of their own
+QUICK = 0.1  # of what was left to gain: the damping that leaves less than that is kept
+MORE, LESS = 5.0, 0.2  # times the damping
+STEPS, MOST_DAMPING = 80, 1.0
+POSE = 6
+
 
 def version():
     """The version of mrcal as whoever installed it has it, for mrcal 2.2 does not know its own; None without mrcal."""
@@ -54,6 +66,8 @@ def solve(problem):
         now[0, :shared] = intrinsics[:shared]
         mrcal.optimize(now, *positional, stage, **named, **{**PLAIN, **options})
         intrinsics = now[0]
+    if stages[-1] in RATIONAL:
+        finish(now, problem["poses"], positional, stages[-1], {**named, **PLAIN, **last}, "grid" in problem)
     solution = {"intrinsics": intrinsics, "poses": problem["poses"]}
     if "grid" in problem:
         rows, columns = problem["grid"].shape[1:3]
@@ -105,6 +119,131 @@ def point_arguments(problem):
     # beyond these ranges mrcal would add a penalty of its own
     named = {"Npoints_fixed": len(points), "point_min_range": 1e-6, "point_max_range": 1e9}
     return positional, named, {}
+
+
+def finish(intrinsics, poses, positional, lensmodel, named, grid):
+    """The last steps to the least sum of squares, in place, by mrcal's own residuals and derivatives.
+
+    Mrcal ends where its steps are short, and along the bent valley of a rational lens model that images barely
+    determine all of them are. Here steps are damped (Levenberg and Marquardt) for the camera only, and the poses
+    follow at once. The damping begins at the least squared singular value, below which it does nothing; it grows where
+    a step leads too far or the next one leads back, and falls where that leads on.
+    """
+    import mrcal
+    import numpy as np
+
+    views = len(poses)
+    warp = named["calobject_warp"] if named["do_optimize_calobject_warp"] else np.zeros(0)
+    state = mrcal.optimizer_callback(
+        intrinsics, *positional, lensmodel, **named, no_jacobian=True, no_factorization=True
+    )[0]
+    scale = np.ones_like(state)  # of mrcal's state, which has no units
+    counts = {"Nframes" if grid else "Ncameras_extrinsics": views, "Ncameras_intrinsics": 1}
+    mrcal.unpack_state(scale, lensmodel=lensmodel, do_optimize_calobject_warp=bool(warp.size), **counts)
+
+    def at(state):
+        values = np.split(state * scale, [intrinsics.size, intrinsics.size + poses.size])
+        for array, value in zip((intrinsics, poses, warp), values, strict=True):
+            array[...] = value.reshape(array.shape)
+        _, left, derivatives, _ = mrcal.optimizer_callback(
+            intrinsics, *positional, lensmodel, **named, no_factorization=True
+        )
+        return Place(state, left, derivatives, intrinsics.size, views)
+
+    here = at(state)
+    variance = max(here.cost / here.numbers, EXACT_PX**2)
+    if here.promised < FARTHEST**2 * variance:
+        try:
+            for place in descent(here, at, variance):
+                state = place.state
+        except np.linalg.LinAlgError:  # a place from which there is no step: the one before it is taken
+            pass
+    at(state)
+
+
+def descent(here, at, variance):
+    """Lower and lower places, until hardly anything is left to gain."""
+    damping = 0.0
+    for _ in range(STEPS):
+        if here.promised <= ENOUGH * here.cost:
+            return
+        step = here.step(damping)
+        there = at(here.after(step))
+        if not there.better(here) and here.promised > CLOSE * variance:
+            there = at(there.after(0.0 * step))
+        if there.better(here):
+            if there.promised > QUICK * here.promised:
+                back = (there.camera @ step) @ there.left < 0.0
+                damping = max(MORE * damping, there.least_damping()) if back else LESS * damping
+            here = there
+            yield here
+        elif here.promised < NEAR * variance or damping > MOST_DAMPING:
+            return
+        else:
+            damping = max(MORE * damping, here.least_damping())
+
+
+class Place:
+    """A state and the sum of squares around it, each view's pose eliminated by an orthogonal triangulation."""
+
+    def __init__(self, state, left, derivatives, lens, views):
+        import itertools
+
+        import numpy as np
+
+        self.state, self.cost, self.numbers = state, left @ left, len(left)
+        self.in_pose = in_pose = np.zeros(len(state), dtype=bool)
+        in_pose[lens : lens + POSE * views] = True
+        self.others = np.flatnonzero(~in_pose)
+        column = np.empty(len(state), dtype=int)  # of each unknown in its view's rows: its pose first
+        column[in_pose] = np.tile(np.arange(POSE), views)
+        column[self.others] = POSE + np.arange(len(self.others))
+        entries = derivatives.tocoo()
+        rows = np.zeros((len(left), POSE + len(self.others) + 1))
+        rows[entries.row, column[entries.col]] = entries.data
+        rows[:, -1] = -left
+        view = np.full(len(left), views)  # rows that no pose changes tell nothing
+        of_pose = in_pose[entries.col]
+        view[entries.row[of_pose]] = (entries.col[of_pose] - lens) // POSE
+        order = np.argsort(view, kind="stable")
+        bounds = np.searchsorted(view[order], np.arange(views + 1))
+        lacking = [(0, rows.shape[1]), (0, 0)]
+        of_view = [np.pad(rows[order[begin:end]], lacking) for begin, end in itertools.pairwise(bounds)]
+        self.views = np.array([np.linalg.qr(rows, mode="r") for rows in of_view])
+        triangle = np.linalg.qr(self.views[:, POSE:, POSE:].reshape(-1, len(self.others) + 1), mode="r")
+        self.camera, self.left = triangle[:-1, :-1], triangle[:-1, -1]
+        self.promised = self.left @ self.left
+        self.scale = 1.0 / np.linalg.norm(self.camera, axis=0)
+
+    def least_damping(self):
+        """What first does anything to a step."""
+        import numpy as np
+
+        return max(np.linalg.svd(self.camera * self.scale, compute_uv=False)[-1] ** 2, 1e-20)
+
+    def step(self, damping):
+        """The camera's, and of a warp."""
+        import numpy as np
+
+        rows = np.vstack([self.camera * self.scale, np.sqrt(damping) * np.eye(len(self.left))])
+        return self.scale * np.linalg.lstsq(rows, np.append(self.left, 0.0 * self.left), rcond=0.0)[0]
+
+    def after(self, step):
+        """The state after a step of the camera, the poses following."""
+        import numpy as np
+
+        of_poses = self.views[:, :POSE, -1] - self.views[:, :POSE, POSE:-1] @ step
+        poses = np.linalg.solve(self.views[:, :POSE, :POSE], of_poses[:, :, None])
+        moved = self.state.copy()
+        moved[self.others] += step
+        moved[self.in_pose] += poses.ravel()
+        return moved
+
+    def better(self, other):
+        """Whether the sum of squares is lower, or there is less to gain and it is the same but for rounding."""
+        if self.cost < other.cost * (1.0 - ROUNDING):
+            return True
+        return self.promised < other.promised and self.cost <= other.cost * (1.0 + ROUNDING)
 
 
 def main(arguments):
