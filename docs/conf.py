@@ -19,6 +19,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 default_role = "code"
 html_theme = "furo"
+html_show_copyright = False  # LICENSE says it
 html_title = f"opencsp-calib {version}"
 exclude_patterns = ["_build", "example_plugin"]
 

@@ -1,32 +1,32 @@
 """Whether a calibration can be believed: solver against solver, half against half, model against model.
 
-All on the same observations, without the corners that the calibration left out as outliers. Solvers are compared like
-with like: the board as solved held fixed, equal weights, nothing robust, numbers in single precision, which is what
-some engines take, so that there is one right answer.
+All on the same observations, without the corners that the calibration left out as outliers.
 """
 
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from opencsp_calib.arrays import Mask
 from opencsp_calib.calibration import Calibration
-from opencsp_calib.comparison import Difference, compare
-from opencsp_calib.detection import Observations
-from opencsp_calib.errors import InputError
+from opencsp_calib.comparison import compare
 from opencsp_calib.interfaces import Solver
-from opencsp_calib.options import SolveOptions
 from opencsp_calib.projection_sigma import sigma_map
-from opencsp_calib.resampling import known_corners
+from opencsp_calib.solver_comparison import (
+    AGREE_PX,
+    LIKE_WITH_LIKE,
+    Pair,
+    SolverResult,
+    all_solved,
+    differences,
+    keeping,
+    of_known_corners,
+)
 from opencsp_calib.trials import LADDER, Trials
 from opencsp_calib.uncertainty import student_factor
 
-__all__ = ["AGREE_PX", "HELD_OUT_REMARK", "SENTENCES", "Pair", "SolverResult", "Validation", "ValidationVerdict"]
-__all__ += ["validate"]
+__all__ = ["SENTENCES", "Validation", "ValidationVerdict", "validate"]
 
 ValidationVerdict: TypeAlias = Literal["agree", "disagree", "not compared"]
 """On a calibration: whether solvers agree on it."""
@@ -36,65 +36,10 @@ SENTENCES: Mapping[ValidationVerdict, str] = {
     "not compared": "The solvers were not compared: fewer than two could run.",
 }
 """What each verdict says to people."""
-AGREE_PX = 1e-3
-"""Solvers of the same problem agree to 1e-4 px or better; a thousandth cannot come from rounding."""
-LIKE_WITH_LIKE = SolveOptions()
-"""Equal weights, nothing robust; and pixels free: the board being held, their aspect is determined."""
 HELD_OUT_REMARK = (
     "the rms of held-out views is nearly blind to wrong intrinsics, because each view's pose is fitted to them: it "
     "tells a wrong board, not a wrong camera"
 )
-
-
-@dataclass(frozen=True, eq=False)
-class SolverResult:
-    """What one solver found.
-
-    Parameters
-    ----------
-    name, version : str
-    calibration : Calibration
-    seconds : float
-        Wall time, the way of the data to its engine and back included.
-    """
-
-    name: str
-    version: str
-    calibration: Calibration = field(repr=False)
-    seconds: float
-
-    def as_json(self) -> dict[str, Any]:
-        """Its figures, for programs."""
-        camera = self.calibration.camera
-        params = dict(zip(camera.lens.parameter_names, camera.params.tolist(), strict=True))
-        rms, seconds = self.calibration.rms_px, round(self.seconds, 3)
-        return {"version": self.version, "rms_px": rms, "params": params, "seconds": seconds}
-
-
-@dataclass(frozen=True, eq=False)
-class Pair:
-    """Two solvers' cameras, compared.
-
-    Parameters
-    ----------
-    a, b : str
-        Names of the solvers.
-    difference : Difference
-    """
-
-    a: str
-    b: str
-    difference: Difference = field(repr=False)
-
-    @property
-    def agree(self) -> bool:
-        """Whether they differ nowhere in the image by more than `AGREE_PX`."""
-        return self.difference.worst_px <= AGREE_PX
-
-    def as_json(self) -> dict[str, Any]:
-        """Its figures, for programs."""
-        worst = self.difference.worst_px
-        return {"a": self.a, "b": self.b, "rms_px": self.difference.rms_px, "worst_px": worst, "agree": self.agree}
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,45 +109,12 @@ def validate(calibration: Calibration, solvers: Mapping[str, Solver], *, models:
     models : sequence of str
         Lens models to try, from the simplest to the richest.
     """
-    calibration = _keeping(calibration, [~outliers for outliers in calibration.outliers])
-    results, left_out = _all_solved(calibration, solvers)
-    pairs = tuple(
-        Pair(a.name, b.name, compare(a.calibration.camera, b.calibration.camera)) for a, b in combinations(results, 2)
-    )
+    calibration = keeping(calibration, [~outliers for outliers in calibration.outliers])
+    results, left_out = all_solved(calibration, solvers)
+    pairs = differences(results)
     trials, with_what = _tried(calibration, solvers, models)
     reasons = (*_of_solvers(pairs), *left_out, *with_what, *_of_halves(trials), *_of_models(trials), *_of_board(trials))
     return Validation(calibration, results, pairs, trials, (*reasons, *trials.left_out))
-
-
-def _all_solved(calibration: Calibration, solvers: Mapping[str, Solver]) -> tuple[tuple[SolverResult, ...], list[str]]:
-    """By every solver that can, the board as solved held fixed; and why the others could not."""
-    observations = _in_single_precision(_of_known_corners(calibration).observations)
-    results, left_out = [], []
-    for name, solver in sorted(solvers.items()):
-        begin = time.perf_counter()
-        try:
-            missing = solver.missing()
-            if missing:
-                raise InputError(missing)
-            found = solver.solve(observations, calibration.camera.model, LIKE_WITH_LIKE)
-            results.append(SolverResult(name, solver.version(), found, time.perf_counter() - begin))
-        except Exception as error:  # a stranger's code: whatever it does must not stop ours
-            left_out.append(f"the solver {name} was left out: {error}")
-    return tuple(results), left_out
-
-
-def _in_single_precision(observations: Observations) -> Observations:
-    """Pixels, and the board in units of its spacing, rounded: some engines take no more, and would round by themselves.
-
-    What rounding does, up to 1e-4 px each, can move the corners of the image by a thousandth of a pixel.
-    """
-    views = tuple(
-        replace(view, detection=replace(view.detection, pixels=view.detection.pixels.astype(np.float32)))
-        for view in observations.views
-    )
-    spacing = observations.board.spacing_m
-    points = (observations.board.points / spacing).astype(np.float32).astype(np.float64) * spacing
-    return replace(observations, views=views, board=observations.board.with_points(points))
 
 
 def _tried(
@@ -217,32 +129,9 @@ def _tried(
             return Trials.of(calibration, solver, models), ()
     if not here:
         return Trials(), (f"halves and lens models were not tried: no solver here has {model}",)
-    held = replace(_of_known_corners(calibration), options=LIKE_WITH_LIKE)
+    held = replace(of_known_corners(calibration), options=LIKE_WITH_LIKE)
     said = f"halves and lens models: no solver here can do all that {own} did; {here[0].name} with the board as solved"
     return Trials.of(held, here[0], models), (f"{said}, equal weights",)
-
-
-def _of_known_corners(calibration: Calibration) -> Calibration:
-    """On the board as solved, taken as given; without corners that were not solved for."""
-    known = known_corners(calibration)
-    kept = _keeping(calibration, [known[detection.ids] for detection in calibration.observations.detections])
-    return replace(kept, observations=kept.observations.with_board(calibration.board))
-
-
-def _keeping(calibration: Calibration, masks: Sequence[Mask]) -> Calibration:
-    """The same, as if of each used view only some corners had been seen."""
-    observations = calibration.observations
-    chosen = dict(zip((view.image for view in observations.used), masks, strict=True))
-    views = tuple(
-        replace(view, detection=view.detection.keeping(chosen[view.image])) if view.image in chosen else view
-        for view in observations.views
-    )
-    return replace(
-        calibration,
-        observations=replace(observations, views=views),
-        residuals=tuple(r[mask] for r, mask in zip(calibration.residuals, masks, strict=True)),
-        outliers=tuple(o[mask] for o, mask in zip(calibration.outliers, masks, strict=True)),
-    )
 
 
 def _of_solvers(pairs: Sequence[Pair]) -> tuple[str, ...]:

@@ -39,7 +39,7 @@ TIERS = (
     "journal cluster",
     "detecting",
     "pipeline demo camera_files",
-    "trials validate check coach fleet_file",
+    "trials solver_comparison validate check coach fleet_file",
     "fleet",
     "capture",
     "report",

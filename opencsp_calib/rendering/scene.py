@@ -65,7 +65,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Exposure:
-    """How the camera takes the picture.
+    """How the camera takes the photograph.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ A grid can be read from each of its four sides. Of these readings a photograph s
 - only those that have as many columns and rows as the board, or fewer where the board is cut off on one side and is
   seen to end on the other (`margins`);
 - where columns and rows are not both even or both odd, only those with a dark outer square at id 0;
-- otherwise the board looks the same upside down, and nothing in the picture tells its ends apart. Then the reading
+- otherwise the board looks the same upside down, and nothing in the image tells its ends apart. Then the reading
   whose roll is in [-135, 45) degrees is taken, [-45, 45) where a quarter turn looks the same, too. So the change comes
   far from the ways in which boards are held, upright or turned by a quarter.
 
@@ -88,7 +88,7 @@ def placed(grey: NDArray[np.float32], grid: Floats, board: Board) -> Placed | No
 
 
 def _readings(grey: NDArray[np.float32], grid: Floats, board: Board, whole: bool) -> Iterator[_Reading]:
-    """All readings that nothing in the picture speaks against; where the whole board is, its size tells its place."""
+    """All readings that nothing in the image speaks against; where the whole board is, its size tells its place."""
     columns, rows = board.grid
     all_ids = np.arange(columns * rows).reshape(rows, columns)
     sides = (False,) * 4 if whole else sides_seen(grey, grid)

@@ -1,4 +1,4 @@
-"""Is a grid of corners the picture of a flat board? Then its pixels are smooth functions of row and column."""
+"""Is a grid of corners the image of a flat board? Then its pixels are smooth functions of row and column."""
 
 import numpy as np
 
