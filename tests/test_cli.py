@@ -10,7 +10,7 @@ from command_line import QUICK, answer, complaint
 from worlds import SmallWorld
 
 from opencsp_calib.cli import run
-from opencsp_calib.hdf5_calibration import load_calibration
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 
 
 def test_preset_opencsp_does_exactly_the_seeds_way(
@@ -67,6 +67,27 @@ def test_detect_then_solve_is_calibrate(photographs: Path, tmp_path: Path, capsy
     whole = answer(capsys, "calibrate", photographs, "--board", SmallWorld.spec, *QUICK)
     assert solved["camera"]["params"] == whole["camera"]["params"]
     assert solved["output"] == str(out)
+
+
+def test_how_corners_are_weighed_is_asked_for_and_kept(camera_file: Path, tmp_path: Path) -> None:
+    for asked, weights, robust in (("--weights=equal --no-robust", "equal", False), ("--robust", "covariance", True)):
+        out = tmp_path / "c.h5"
+        assert run(["solve", str(camera_file), "--solver", "bundle", *asked.split(), "-o", str(out)]) == 0
+        options = load_calibration(out).options
+        assert (options.weights, options.robust) == (weights, robust)
+
+
+def test_how_corners_are_located_is_asked_for(photographs: Path, tmp_path: Path) -> None:
+    few = [str(path) for path in sorted(photographs.iterdir())[:1]]
+    found = []
+    for refine in ("none", "subpix", "model"):
+        seen = tmp_path / f"{refine}.h5"
+        asked = ["--detector", "checkerboard", "--refine", refine]
+        assert run(["detect", *few, "--board", SmallWorld.spec, *asked, "-o", str(seen)]) == 0
+        found += load_observations(seen).detections
+    assert [detection.covariance is None for detection in found] == [True, True, False]
+    off = [np.abs(detection.pixels - found[-1].pixels).max() for detection in found]
+    assert off[0] > off[1] > off[2] == 0
 
 
 def test_the_report_is_one_file_that_needs_no_other(photographs: Path, tmp_path: Path) -> None:
