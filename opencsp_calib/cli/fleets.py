@@ -25,7 +25,10 @@ def fleet(
             metavar="DIR | fleet.yaml", help="A folder with a folder of photographs for each camera, or a file."
         ),
     ],
-    board: args.OptionalBoardSpec = None,
+    board: Annotated[
+        str | None,
+        typer.Option(metavar="SPEC", help="The board of every camera to which the file gives none of its own."),
+    ] = None,
     model: Model = None,
     solver: SolverName = None,
     jobs: args.Jobs = None,
