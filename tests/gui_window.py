@@ -118,7 +118,12 @@ class Window:
         return True
 
     def find_all(self, selector: str) -> list[Any]:
-        return list(self.browser.find_elements("css selector", selector))
+        """Those that are not behind another tab."""
+        script = (
+            "return [...document.querySelectorAll(arguments[0])]"
+            ".filter(element => element.checkVisibility({visibilityProperty: true}))"
+        )
+        return list(self.browser.execute_script(script, selector))
 
     def text_is_there(self, text: str) -> bool:
         return text in str(self.browser.execute_script("return document.body.innerText"))  # quicker than the driver's

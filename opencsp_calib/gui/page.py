@@ -35,6 +35,7 @@ from opencsp_calib.gui import (
     views,
 )
 from opencsp_calib.gui.controls import Part
+from opencsp_calib.gui.panels import Panels
 from opencsp_calib.gui.session import Session
 
 __all__ = ["Page", "show"]
@@ -123,31 +124,30 @@ class Page:
                 for name in ("Calibrate", *dict(TABS)):
                     ui.tab(name)
             ColoursButton()
-        with ui.tab_panels(self._pages, value="Calibrate", animated=False).classes("panels body"):
-            with ui.tab_panel("Calibrate").classes("bare"):
-                self._build_calibrate()
-            for name, build in TABS:
-                self._seldom[name] = self._when_shown(ui.tab_panel(name).classes("page"), build)
+        panels = Panels(self._pages)
+        with panels.add("Calibrate", "columns"):
+            self._build_calibrate()
+        for name, build in TABS:
+            self._seldom[name] = self._when_shown(panels.add(name, "page"), build)
         self._pages.on_value_change(self.refresh)
         with Part("footer").classes("foot"):
             self._always.append(status.build(self))
 
     def _build_calibrate(self) -> None:
-        with ui.element("div").classes("columns"):
-            with ui.element("div").classes("steps"):
-                for number, (title, build) in enumerate(STEPS, start=1):
-                    with Part("section").classes("step"):
-                        ui.html(f"<h2><span>{number}</span>{title}</h2>", sanitize=False)
-                        self._always.append(build(self))
-            with Part("main").classes("results"):
-                with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
-                    self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
-                with ui.tab_panels(self._results, value=RESULTS[0][0], animated=False).classes("panels"):
-                    for name, build in RESULTS:
-                        self._refreshers[name] = self._when_shown(ui.tab_panel(name).classes("bare"), build)
-                self._results.on_value_change(self.refresh)
+        with ui.element("div").classes("steps"):
+            for number, (title, build) in enumerate(STEPS, start=1):
+                with Part("section").classes("step"):
+                    ui.html(f"<h2><span>{number}</span>{title}</h2>", sanitize=False)
+                    self._always.append(build(self))
+        with Part("main").classes("results"):
+            with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
+                self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
+            panels = Panels(self._results)
+            for name, build in RESULTS:
+                self._refreshers[name] = self._when_shown(panels.add(name, "result"), build)
+            self._results.on_value_change(self.refresh)
 
-    def _when_shown(self, panel: ui.tab_panel, build: Build) -> Refresh:
+    def _when_shown(self, panel: Part, build: Build) -> Refresh:
         """Build a section when it is first refreshed, so that the page does not wait for what is not seen."""
         built: list[Refresh] = []
 
@@ -158,6 +158,13 @@ class Page:
             built[0]()
 
         return refresh
+
+    async def prepare(self) -> None:
+        """Do what need not wait until it is asked for, once the page is there."""
+        await self.session.ask_plugins()
+        # what the browser loads for these would come while both cores look for corners
+        for name in BEFORE_CALIBRATION:
+            self._refreshers[name]()
 
     def refresh(self) -> None:
         """Bring what can be seen up to date."""
@@ -179,7 +186,7 @@ def show(session: Session) -> None:
     page.build()
     page.refresh()
     session.changed.subscribe(page.refresh)
-    ui.context.client.on_connect(session.ask_plugins)  # then the page is there
+    ui.context.client.on_connect(page.prepare)
 
 
 def _style(package: str) -> str:
