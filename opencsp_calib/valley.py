@@ -23,7 +23,7 @@ STEPS = 80
 ENOUGH = 1e-16  # of the sum of squares left to gain: some 1e-6 sigmas
 NEAR = 1e-12  # variances left to gain: where nothing but rounding keeps a step from leading on
 CLOSE = 1e-2  # likewise: from where on poses need no fit of their own
-ROUNDING = 1e-9  # of the sum of squares: near the minimum it may rise by that
+ROUNDING = 1e-9  # of the sum of squares: what its digits can tell for certain
 QUICK = 0.1  # of what was left to gain: the damping that leaves less than that is kept
 MORE, LESS = 5.0, 0.2  # times the damping
 LEAST_DAMPING, MOST_DAMPING = 1e-20, 1.0
@@ -69,12 +69,13 @@ def lowest(here: AnyPlace, after: Callable[[AnyPlace, Params], AnyPlace | None],
             break
         step = camera_step(here.triangle, damping)
         there = after(here, step)
-        if there and not _better(there, here) and here.promised > CLOSE * variance:
+        if there and not _lower(there, here, step) and here.promised > CLOSE * variance:
             there = after(there, np.zeros(len(step)))
-        if there and _better(there, here):
-            here, damping = there, _next_damping(damping, here, there, step)
-        elif here.promised < NEAR * variance or damping > MOST_DAMPING:
+        rounding = here.promised < NEAR * variance and not (there and there.promised < here.promised)
+        if rounding or damping > MOST_DAMPING:
             break
+        if there and _lower(there, here, step):
+            here, damping = there, _next_damping(damping, here, there, step)
         else:
             damping = max(MORE * damping, _least_damping(here.triangle))
     return here
@@ -100,15 +101,21 @@ def camera_step(triangle: Matrix, damping: float) -> Params:
 def _next_damping(damping: float, here: Place, there: Place, step: Params) -> float:
     if there.promised < QUICK * here.promised:
         return damping
-    if (there.triangle[:-1, :-1] @ step) @ there.triangle[:-1, -1] < 0.0:
+    if _slope(there, step) < 0.0:
         return max(MORE * damping, _least_damping(there.triangle))
     return LESS * damping if damping > LESS * _least_damping(there.triangle) else 0.0
 
 
-def _better(there: Place, here: Place) -> bool:
-    """Whether the sum of squares is lower, or there is less to gain and it is the same but for rounding."""
-    lower = there.cost < here.cost * (1.0 - ROUNDING)
-    return lower or (there.promised < here.promised and there.cost <= here.cost * (1.0 + ROUNDING))
+def _lower(there: Place, here: Place, step: Params) -> bool:
+    """Whether the sum of squares is lower; by the slopes at both ends where its own digits are too few to tell."""
+    if there.cost < here.cost * (1.0 - ROUNDING):
+        return True
+    return there.cost <= here.cost * (1.0 + ROUNDING) and _slope(here, step) + _slope(there, step) > 0.0
+
+
+def _slope(here: Place, step: Params) -> float:
+    """Half of by how much the sum of squares falls along a step, were its slope the same all the way."""
+    return float((here.triangle[:-1, :-1] @ step) @ here.triangle[:-1, -1])
 
 
 def _scale(triangle: Matrix) -> Params:

@@ -16,7 +16,7 @@ ENOUGH = 1e-16  # of the sum of squares left to gain: some 1e-6 sigmas
 NEAR = 1e-12  # variances left to gain: where nothing but rounding keeps a step from leading on
 FARTHEST = 10.0  # sigmas; from farther away mrcal has found something else
 EXACT_PX = 1e-3  # no corner is located better: pixels without noise are judged as if they had this
-ROUNDING = 1e-9  # of the sum of squares: near the minimum it may rise by that
+ROUNDING = 1e-9  # of the sum of squares: what its digits can tell for certain
 CLOSE = 1e-2  # variances left to gain: from where on poses need no fit of their own
 QUICK = 0.1  # of what was left to gain: the damping that leaves less than that is kept
 MORE, LESS = 5.0, 0.2  # times the damping
@@ -169,16 +169,16 @@ def descent(here, at, variance):
             return
         step = here.step(damping)
         there = at(here.after(step))
-        if not there.better(here) and here.promised > CLOSE * variance:
+        if not there.lower(here, step) and here.promised > CLOSE * variance:
             there = at(there.after(0.0 * step))
-        if there.better(here):
+        if damping > MOST_DAMPING or (here.promised < NEAR * variance and not there.promised < here.promised):
+            return
+        if there.lower(here, step):
             if there.promised > QUICK * here.promised:
-                back = (there.camera @ step) @ there.left < 0.0
+                back = there.slope(step) < 0.0
                 damping = max(MORE * damping, there.least_damping()) if back else LESS * damping
             here = there
             yield here
-        elif here.promised < NEAR * variance or damping > MOST_DAMPING:
-            return
         else:
             damping = max(MORE * damping, here.least_damping())
 
@@ -239,11 +239,15 @@ class Place:
         moved[self.in_pose] += poses.ravel()
         return moved
 
-    def better(self, other):
-        """Whether the sum of squares is lower, or there is less to gain and it is the same but for rounding."""
+    def lower(self, other, step):
+        """Whether the sum of squares is lower than before a step; by the slopes where its own digits cannot tell."""
         if self.cost < other.cost * (1.0 - ROUNDING):
             return True
-        return self.promised < other.promised and self.cost <= other.cost * (1.0 + ROUNDING)
+        return self.cost <= other.cost * (1.0 + ROUNDING) and self.slope(step) + other.slope(step) > 0.0
+
+    def slope(self, step):
+        """Half of by how much the sum of squares falls along a step, were its slope the same all the way."""
+        return (self.camera @ step) @ self.left
 
 
 def main(arguments):

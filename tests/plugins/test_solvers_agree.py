@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from solver_worlds import seed_world
+from solver_worlds import sandia, seed_world
 
 from opencsp_calib.comparison import pixel_grid
 from opencsp_calib.convergence import remaining_sigmas
@@ -25,3 +25,8 @@ def test_a_lens_that_has_no_use_for_a_fraction(model):
         seen.append(calibration.camera.project(rays))
     assert len(seen) >= 2
     assert np.ptp(seen, axis=0).max() < 1e-5
+
+
+def test_bundle_is_at_the_minimum_where_digits_of_the_sum_of_squares_cannot_tell(data_dir):
+    observations, _ = sandia(data_dir)
+    assert remaining_sigmas(SOLVERS["bundle"].solve(observations, "opencv8", SolveOptions())) < 1e-5
