@@ -13,7 +13,7 @@ __all__ = ["camera_without_each_view"]
 
 CG_TOLERANCE = 1e-6  # of each step's length in sigmas
 CG_STEPS = 200
-TOGETHER = 2**16  # numbers: as many views are left out at once as have so many unknowns
+TOGETHER = 2**14  # numbers: as many views are left out at once as have so many unknowns; more are hardly quicker
 
 
 def camera_without_each_view(
@@ -70,7 +70,8 @@ def _by_iteration(whole: Factorisation, ahead: Floats | None, tolerance: float) 
     views, size = len(inverse_pose), unknowns.shared + CORNER * len(unknowns.corners)
     together = max(1, TOGETHER // size)
     runs = [(begin, min(begin + together, views)) for begin in range(0, views, together)]
-    return np.concatenate([_without(whole, inverse_pose, run, ahead, tolerance) for run in runs])[:, : unknowns.shared]
+    moves = (_without(whole, inverse_pose, run, ahead, tolerance)[:, : unknowns.shared].copy() for run in runs)
+    return np.concatenate(list(moves))  # without the copies all that the corners move by would be kept until here
 
 
 def _without(
