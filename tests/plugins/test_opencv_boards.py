@@ -154,10 +154,9 @@ def test_a_board_of_another_kind_is_not_drawn() -> None:
 
 def test_parsing_needs_no_opencv_and_drawing_says_so() -> None:
     program = """
-import sys, importlib.util
-found = importlib.util.find_spec
-importlib.util.find_spec = lambda name, *rest: None if name == "cv2" else found(name, *rest)
-sys.modules["cv2"] = None
+from importlib.machinery import PathFinder
+found = PathFinder.find_spec
+PathFinder.find_spec = lambda name, *rest: None if name == "cv2" else found(name, *rest)
 from opencsp_calib_opencv.board_kinds import CharucoKind, CheckerboardKind
 from opencsp_calib.errors import MissingDependencyError
 print(CheckerboardKind().parse("checkerboard:18x23:50mm").spec, CheckerboardKind().missing())
