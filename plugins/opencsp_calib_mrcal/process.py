@@ -19,7 +19,7 @@ __all__ = ["VARIABLE", "missing_mrcal", "mrcal_version", "run_mrcal"]
 
 VARIABLE = "OPENCSP_CALIB_MRCAL_PYTHON"
 DEBIAN = "/usr/bin/python3"
-WORKER = Path(__file__).with_name("worker.py")
+WORKER = Path(__file__).with_name("worker")  # a folder that is run as it is
 PROBE_S = 20.0
 
 
@@ -40,7 +40,7 @@ def mrcal_version() -> str:
 
 
 def run_mrcal(problem: Mapping[str, NDArray[Any]], timeout_s: float) -> dict[str, NDArray[Any]]:
-    """What mrcal makes of a problem; see `opencsp_calib_mrcal.worker.solve`.
+    """What mrcal makes of a problem; see `opencsp_calib_mrcal.worker.problem.solve`.
 
     Raises
     ------

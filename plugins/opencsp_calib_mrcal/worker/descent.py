@@ -1,17 +1,16 @@
-"""Runs mrcal in a Python that has it: ``worker.py PROBLEM SOLUTION``, two ``.npz`` files, or ``worker.py --version``.
+"""The last steps to the least sum of squares, by mrcal's own residuals and derivatives.
 
-It imports nothing of opencsp-calib: Debian's mrcal is built for another NumPy than ours and lives in Debian's Python.
+Mrcal ends where its steps are short, and along the bent valley of a rational lens model that images barely determine
+all of them are. Here steps are damped (Levenberg and Marquardt) for the camera only, and the poses follow at once. The
+damping begins at the least squared singular value, below which it does nothing; it grows where a step leads too far or
+the next one leads back, and falls where that leads on.
 """
 
-import sys
+import itertools
 
-if __name__ == "__main__":
-    del sys.path[0]  # this folder, whose modules are for the other Python
+import mrcal
+import numpy as np
 
-NO_MRCAL = 3  # exit status
-PLAIN = {"do_apply_outlier_rejection": False, "do_optimize_calobject_warp": False}
-
-RATIONAL = ("LENSMODEL_OPENCV8", "LENSMODEL_OPENCV12")
 ENOUGH = 1e-16  # of the sum of squares left to gain: some 1e-6 sigmas
 NEAR = 1e-12  # variances left to gain: where nothing but rounding keeps a step from leading on
 FARTHEST = 10.0  # sigmas; from farther away mrcal has found something else
@@ -24,114 +23,12 @@ STEPS, MOST_DAMPING = 80, 1.0
 POSE = 6
 
 
-def version():
-    """The version of mrcal as whoever installed it has it, for mrcal 2.2 does not know its own; None without mrcal."""
-    import importlib.metadata
-    import importlib.util
-    import shutil
-    import subprocess
-
-    if importlib.util.find_spec("mrcal") is None:
-        return None
-    try:
-        return importlib.metadata.version("mrcal")
-    except importlib.metadata.PackageNotFoundError:
-        dpkg = shutil.which("dpkg-query")
-    if dpkg is None:
-        return "unknown"
-    command = [dpkg, "--show", "--showformat=${Version}", "python3-mrcal"]
-    return subprocess.run(command, capture_output=True, text=True).stdout.strip() or "unknown"
-
-
-def solve(problem):
-    """The solution of a problem.
-
-    Both are dicts of arrays. A problem has ``intrinsics`` (P,), ``poses`` (V, 6) as rotation vector and translation,
-    ``lensmodels``, the stages to go through from the simplest to the one wanted, ``imagersize`` (2,), and what either
-    `grid_arguments` or `point_arguments` wants. Lengths are in any unit.
-    """
-    import mrcal
-    import numpy as np
-
-    problem = {name: np.array(value) for name, value in problem.items()}  # mrcal writes into what it is given
-    which = grid_arguments if "grid" in problem else point_arguments
-    positional, named, last = which(problem)
-    named["imagersizes"] = problem["imagersize"][None].astype(np.int32)
-    named["do_apply_regularization"] = False  # pulls the principal point to the middle and distortion to zero
-    intrinsics, stages = problem["intrinsics"], [str(name) for name in problem["lensmodels"]]
-    for stage in stages:
-        options = last if stage == stages[-1] else {}
-        now = np.zeros((1, mrcal.lensmodel_num_params(stage)))
-        shared = min(now.size, intrinsics.size)
-        now[0, :shared] = intrinsics[:shared]
-        mrcal.optimize(now, *positional, stage, **named, **{**PLAIN, **options})
-        intrinsics = now[0]
-    if stages[-1] in RATIONAL:
-        finish(now, problem["poses"], positional, stages[-1], {**named, **PLAIN, **last}, "grid" in problem)
-    solution = {"intrinsics": intrinsics, "poses": problem["poses"]}
-    if "grid" in problem:
-        rows, columns = problem["grid"].shape[1:3]
-        spacing, warp = float(problem["spacing"]), named["calobject_warp"]
-        board = mrcal.ref_calibration_object(columns, rows, spacing, calobject_warp=warp)
-        solution.update(weights=problem["grid"][..., 2], board=board.reshape(-1, 3))
-    return solution
-
-
-def grid_arguments(problem):
-    """Of an even board that moves before the camera.
-
-    ``grid`` (V, rows, columns, 3) x, y and weight, negative where nothing is seen; ``spacing``; ``warp`` and
-    ``robust``, whether to solve for mrcal's warp and to reject outliers.
-    """
-    import numpy as np
-
-    views = np.arange(len(problem["poses"]), dtype=np.int32)
-    indices = np.column_stack([views, 0 * views, 0 * views - 1])
-    positional = [None, problem["poses"], None, problem["grid"], indices, None, None]
-    named = {
-        "calobject_warp": np.zeros(2) if problem["warp"] else None,
-        "calibration_object_spacing": float(problem["spacing"]),
-    }
-    last = {
-        "do_optimize_calobject_warp": bool(problem["warp"]),
-        "do_apply_outlier_rejection": bool(problem["robust"]),
-    }
-    return positional, named, last
-
-
-def point_arguments(problem):
-    """Of a camera that moves before points that are known, which may be anywhere.
-
-    ``points`` (K, 3); ``observations`` (N, 3) x, y and weight; ``indices`` (N, 3) point, 0, view.
-    """
-    import numpy as np
-
-    points, indices = problem["points"], problem["indices"].astype(np.int32)
-    positional = [
-        problem["poses"],
-        None,
-        points,
-        None,
-        None,
-        problem["observations"],
-        indices,
-    ]
-    # beyond these ranges mrcal would add a penalty of its own
-    named = {"Npoints_fixed": len(points), "point_min_range": 1e-6, "point_max_range": 1e9}
-    return positional, named, {}
-
-
 def finish(intrinsics, poses, positional, lensmodel, named, grid):
-    """The last steps to the least sum of squares, in place, by mrcal's own residuals and derivatives.
+    """Leads a solution to where the sum of squares is least, in place.
 
-    Mrcal ends where its steps are short, and along the bent valley of a rational lens model that images barely
-    determine all of them are. Here steps are damped (Levenberg and Marquardt) for the camera only, and the poses
-    follow at once. The damping begins at the least squared singular value, below which it does nothing; it grows where
-    a step leads too far or the next one leads back, and falls where that leads on.
+    ``intrinsics`` (1, P), ``poses`` (V, 6), then the other arguments of mrcal's ``optimize`` by position, the name of
+    the lens model, and those by name; ``grid`` tells whether the board moves or the camera.
     """
-    import mrcal
-    import numpy as np
-
     views = len(poses)
     warp = named["calobject_warp"] if named["do_optimize_calobject_warp"] else np.zeros(0)
     state = mrcal.optimizer_callback(
@@ -187,10 +84,6 @@ class Place:
     """A state and the sum of squares around it, each view's pose eliminated by an orthogonal triangulation."""
 
     def __init__(self, state, left, derivatives, lens, views):
-        import itertools
-
-        import numpy as np
-
         self.state, self.cost, self.numbers = state, left @ left, len(left)
         self.in_pose = in_pose = np.zeros(len(state), dtype=bool)
         in_pose[lens : lens + POSE * views] = True
@@ -217,21 +110,15 @@ class Place:
 
     def least_damping(self):
         """What first does anything to a step."""
-        import numpy as np
-
         return max(np.linalg.svd(self.camera * self.scale, compute_uv=False)[-1] ** 2, 1e-20)
 
     def step(self, damping):
         """The camera's, and of a warp."""
-        import numpy as np
-
         rows = np.vstack([self.camera * self.scale, np.sqrt(damping) * np.eye(len(self.left))])
         return self.scale * np.linalg.lstsq(rows, np.append(self.left, 0.0 * self.left), rcond=0.0)[0]
 
     def after(self, step):
         """The state after a step of the camera, the poses following."""
-        import numpy as np
-
         of_poses = self.views[:, :POSE, -1] - self.views[:, :POSE, POSE:-1] @ step
         poses = np.linalg.solve(self.views[:, :POSE, :POSE], of_poses[:, :, None])
         moved = self.state.copy()
@@ -248,22 +135,3 @@ class Place:
     def slope(self, step):
         """Half of by how much the sum of squares falls along a step, were its slope the same all the way."""
         return (self.camera @ step) @ self.left
-
-
-def main(arguments):
-    """See the module; the exit status."""
-    if arguments == ["--version"]:
-        found = version()
-        sys.stdout.write(found or "")
-        return 0 if found else NO_MRCAL
-    import numpy as np
-
-    problem, solution = arguments
-    with np.load(problem, allow_pickle=False) as file:
-        solved = solve(dict(file))
-    np.savez(solution, **solved)
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
