@@ -153,8 +153,8 @@ def solve(
         shape is free and all views hold it the same way up, because then the two cannot be told apart.
     weights : 'equal' or 'covariance', optional
     robust : bool, optional
-        These two by default as carefully as the solver is able to: by covariance and robust where it has both
-        abilities, else equal and not robust.
+        These two by default by covariance and robust with `DEFAULT_SOLVER`, which can do both with any corners and any
+        board; with others equal and not robust.
     guess : Camera, optional
         Where to start.
     name : str
@@ -175,7 +175,7 @@ def solve(
     """
     engine = installed().solver(solver)
     _check_views(observations)
-    careful = {"weights", "robust"} <= engine.abilities
+    careful = solver == DEFAULT_SOLVER
     options = SolveOptions(
         guess=guess,
         board_shape="flat" if board_shape == "auto" else board_shape,

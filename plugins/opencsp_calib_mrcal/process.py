@@ -125,8 +125,13 @@ def _probed(python: str) -> str:
 
 
 def _environment(python: str) -> dict[str, str]:
-    """Ours; but Debian's Python must not see packages that were installed for another one."""
-    if python != DEBIAN:
-        return dict(os.environ)
-    kept = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "PYTHONHOME")}
-    return {**kept, "PYTHONNOUSERSITE": "1"}
+    """Ours; but Debian's Python must not see packages that were installed for another one.
+
+    None leaves compiled files beside the worker, which nobody would ever remove.
+    """
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    if python == DEBIAN:
+        environment["PYTHONNOUSERSITE"] = "1"
+        for name in ("PYTHONPATH", "PYTHONHOME"):
+            environment.pop(name, None)
+    return environment

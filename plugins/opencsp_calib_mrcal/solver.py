@@ -69,7 +69,10 @@ class MrcalSolver:
         even = _is_even(observations.board)
         if not even and (options.robust or options.board_shape == "warp"):
             what = "rejects outliers" if options.robust else "solves for a warp"
-            raise InputError(f"mrcal {what} only on an even board, and this one's corners are given as measured")
+            raise InputError(
+                f"mrcal {what} only on an even board, and this one's corners are given as measured; take another "
+                "solver, or do without"
+            )
         stages = (model,) if options.guess else STAGES[model]
         start = initial_camera(observations, model, options.guess)
         unit = UNIT * float(np.ptp(observations.board.nominal_points, axis=0).max())

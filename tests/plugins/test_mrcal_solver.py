@@ -15,6 +15,7 @@ from solver_worlds import SEED_BOARD, sandia, seed_world, worst_px
 from opencsp_calib.convergence import remaining_sigmas
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.options import SolveOptions
+from opencsp_calib.pipeline import solve
 from opencsp_calib.synthetic import bowed
 
 needs_mrcal = pytest.mark.skipif(process.missing_mrcal() is not None, reason=str(process.missing_mrcal()))
@@ -76,6 +77,16 @@ def test_what_mrcal_knows_of_even_boards_only_is_refused_of_others():
         solved(measured, robust=True)
     with pytest.raises(InputError, match="warp only on an even board"):
         solved(measured, board_shape="warp")
+
+
+@needs_mrcal
+def test_unless_told_otherwise_it_takes_any_board_and_any_corners():
+    """Weights and outliers are for `bundle` by default: mrcal would refuse this board and these corners with them."""
+    _, _, observations = seed_world(5)
+    measured = observations.with_board(SEED_BOARD.with_points(SEED_BOARD.points * 1.001))
+    assert measured.detections[0].covariance is None
+    options = solve(measured, solver="mrcal").options
+    assert (options.weights, options.robust) == ("equal", False)
 
 
 @pytest.fixture
