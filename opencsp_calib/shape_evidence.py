@@ -80,12 +80,16 @@ class Evidence:
         return self.moved_px > LEAST_MOVE_PX
 
     def __str__(self) -> str:
+        """Only what decided is given as the reason."""
+        moved, chance = f"the camera by {self.moved_px:.2g} px", f"chance explains ({self.sigma_px:.2g} px typically)"
+        halves = f"differ by {self.solved_halves_px:.2g} instead of {self.given_halves_px:.2g} px"
         if not self.matters:
-            return f"solving for its shape moves the camera by {self.moved_px:.2g} px, less than corners are good to"
-        return (
-            f"solving for its shape moves the camera by {self.moved_px:.2g} px (chance: {self.sigma_px:.2g} px), and "
-            f"halves of the views then differ by {self.solved_halves_px:.2g} instead of {self.given_halves_px:.2g} px"
-        )
+            return f"solving for its shape would move {moved}, which is within the accuracy of the corners"
+        if self.by_halves:
+            return f"halves of the views then {halves}; it moves {moved}"
+        if self.by_move:
+            return f"it moves {moved}, more than {chance}"
+        return f"solving for its shape would move {moved}, which {chance}, and halves of the views would then {halves}"
 
 
 def evidence_of(given: Calibration, shape: SolveOptions) -> Evidence:

@@ -10,7 +10,7 @@ from opencsp_calib import Calibration, Checkerboard, Observations, SolveOptions
 from opencsp_calib.comparison import compare
 from opencsp_calib.projection_sigma import camera_sigma_map
 from opencsp_calib.resampling import compare_halves, leaving_each_out
-from opencsp_calib.shape_evidence import evidence_of
+from opencsp_calib.shape_evidence import Evidence, evidence_of
 from opencsp_calib.synthetic import bowed, demo_camera, observe, seed_poses
 from opencsp_calib.uncertainty import jackknife_covariance
 
@@ -57,10 +57,23 @@ def test_a_bias_that_both_halves_share_is_found_out() -> None:
         assert compare(one.camera, CAMERA).rms_px > 5 * compare(other.camera, CAMERA).rms_px
 
 
-def test_a_move_that_corners_are_not_good_to_is_no_reason() -> None:
+def test_a_move_within_the_accuracy_of_corners_is_no_reason() -> None:
     """Without noise chance explains nothing, so that rounding, or half a micrometre, would speak for the shape."""
     for bow_m in (0.0, 5e-7):
         found = evidence_of(solved(world(12, bow_m, 0.0), FLAT), FREE)
         assert not found.for_shape
-        assert "less than corners are good to" in str(found)
+        assert "within the accuracy of the corners" in str(found)
     assert evidence_of(solved(world(12, 2e-5, 0.0), FLAT), FREE).for_shape
+
+
+@pytest.mark.parametrize(
+    ("figures", "reason"),
+    [
+        ((2.4, 0.41, 0.91, 1.9), "halves of the views then differ by 0.41 instead of 2.4 px"),
+        ((6.2, 15, 32, 15), "more than chance explains (15 px typically)"),
+        ((0.41, 0.6, 0.5, 0.93), "which chance explains (0.93 px typically), and halves"),
+        ((0.1, 0.01, 0.001, 0.0001), "within the accuracy of the corners"),
+    ],
+)
+def test_only_what_decided_is_given_as_the_reason(figures: tuple[float, ...], reason: str) -> None:
+    assert reason in str(Evidence(*figures))
