@@ -9,9 +9,10 @@ from pathlib import Path
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
-from opencsp_calib.errors import FileFormatError, InputError
+from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5 import load_record
 from opencsp_calib.hdf5_calibration import load_calibration
+from opencsp_calib.hdf5_reading import opened
 from opencsp_calib.importing import exact, fitted, pick, read_cameras
 from opencsp_calib.interfaces import Imported, KeepsNotes
 from opencsp_calib.lens_fit import LensFit
@@ -21,7 +22,6 @@ from opencsp_calib.typed import image_size_from
 __all__ = [
     "CameraFile",
     "Converted",
-    "calibration_in",
     "convert",
     "read_camera_file",
     "write_camera_file",
@@ -105,19 +105,18 @@ def read_camera_file(
     cameras = read_cameras(path, installed().camera_formats, image_size_from(image_size), format_name)
     with _naming(path):
         key, imported = pick(cameras, None if where_several and len(cameras) == 1 else name)
-    try:
-        record = load_record(path)
-    except FileFormatError:  # not one of ours: it has no record
-        record = {}
-    return CameraFile(Path(path), key, imported, calibration_in(path), record)
+    return CameraFile(Path(path), key, imported, *_kept_with(path))
 
 
-def calibration_in(path: str | PathLike[str]) -> Calibration | None:
-    """The calibration in one of our camera files; None in any other."""
-    try:
-        return load_calibration(path)
-    except FileFormatError:
-        return None
+def _kept_with(path: str | PathLike[str]) -> tuple[Calibration | None, Mapping[str, str]]:
+    """The calibration and the notes in a camera file of ours; nothing in any other."""
+    import h5py
+
+    if not h5py.is_hdf5(path):
+        return None, {}
+    with opened(path) as file:
+        solved = "Calibration/poses" in file
+    return load_calibration(path) if solved else None, load_record(path)
 
 
 def convert(

@@ -20,9 +20,7 @@ of all of it, which is looked at first (`seal`).
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,29 +29,24 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError
+from opencsp_calib.hdf5_reading import opened, read_dataset
 from opencsp_calib.hdf5_writing import write_hdf5
 from opencsp_calib.models import OPENCV_MODELS
-from opencsp_calib.seal import check_seal
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = [
-    "EXTENSIONS",
     "FORMAT_VERSION",
     "load_camera",
     "load_record",
-    "opened",
     "read_camera",
-    "read_dataset",
     "save_camera",
     "write_camera",
 ]
 
 FORMAT_VERSION = 1
-EXTENSIONS = (".h5", ".hdf5", ".hdf")
-MAX_VALUES = 50_000_000  # in one dataset; more is a damaged or hostile file
-MAX_COEFFICIENTS = 100  # likewise, of a dataset of /Camera
+MAX_COEFFICIENTS = 100  # of a dataset of /Camera; more is a damaged or hostile file
 
 
 def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[str, str] | None = None) -> None:
@@ -117,55 +110,13 @@ def write_camera(camera: Camera, file: "h5py.File") -> None:
     group.attrs["checksum"] = np.bytes_(_checksum(group))
 
 
-@contextmanager
-def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
-    """An HDF5 file, open for reading; whatever is wrong with it ends in a FileFormatError that names it."""
-    import h5py
-
-    path = Path(path)
-    try:
-        if path.is_dir():
-            raise InputError(f"{path} is a folder, no camera or observations file")
-        if not path.is_file():
-            raise InputError(f"no such file: {path}")
-        check_seal(path)
-        with h5py.File(path, "r") as file:
-            yield file
-    except InputError:
-        raise
-    except (OSError, KeyError, ValueError, TypeError, RuntimeError, AttributeError, UnicodeError) as error:
-        raise FileFormatError(f"{path} is not a camera file, or it is damaged: {_one_line(error)}") from None
-
-
-def read_dataset(group: "h5py.Group", name: str) -> Any:
-    """The contents of a dataset that lies within this file and is of a sane size; strings come as str.
-
-    Raises
-    ------
-    FileFormatError
-        If it is missing, is a link to elsewhere, or is too large.
-    """
-    import h5py
-
-    where = f"{group.file.filename}: {group.name.rstrip('/')}/{name}"
-    link = group.get(name, getlink=True)
-    if not isinstance(link, h5py.HardLink):
-        raise FileFormatError(f"{where} is missing" if link is None else f"{where} is a link, which is not followed")
-    dataset = group[name]
-    if not isinstance(dataset, h5py.Dataset) or dataset.external or dataset.is_virtual or dataset.shape is None:
-        raise FileFormatError(f"{where} is not a dataset of this file's own")
-    if dataset.size > MAX_VALUES:
-        raise FileFormatError(f"{where} has {dataset.size} values, more than a camera file can need")
-    if h5py.check_string_dtype(dataset.dtype) is not None:
-        return dataset.asstr()[()]
-    value = dataset[()]
-    if isinstance(value, np.ndarray | np.number):
-        return value
-    raise FileFormatError(f"{where} has values of an unexpected type")
-
-
 def _camera(file: "h5py.File", path: str) -> tuple[Camera, tuple[Problem, ...]]:
     group = file.get("Camera")
+    if group is None and "Calibration/observations" in file:
+        raise FileFormatError(
+            f"{path} holds what was seen in photographs, but no camera: `opencsp-calib solve {path} -o camera.h5` "
+            "calibrates one from it"
+        )
     if group is None:
         raise FileFormatError(f"{path} has no group /Camera: it is not a camera file")
     ours = "format_version" in group.attrs
@@ -260,7 +211,3 @@ def _oddities(matrix: Floats, path: str) -> tuple[Problem, ...]:
         "and OpenCSP, this program does not look at that number"
     )
     return (Problem("scaled-matrix", message),)
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:200]

@@ -42,7 +42,8 @@ from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import FileFormatError, InputError
-from opencsp_calib.hdf5 import opened, read_camera, read_dataset, write_camera
+from opencsp_calib.hdf5 import read_camera, write_camera
+from opencsp_calib.hdf5_reading import opened, read_dataset
 from opencsp_calib.hdf5_writing import write_hdf5
 from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose

@@ -21,6 +21,8 @@ from opencsp_calib.arrays import Params, Pixels, Points
 from opencsp_calib.camera import Camera
 from opencsp_calib.detection import Problem
 from opencsp_calib.errors import FileFormatError, InputError, MissingDependencyError, NotExactError, PluginWarning
+from opencsp_calib.hdf5 import load_camera
+from opencsp_calib.hdf5_reading import like_hdf5
 from opencsp_calib.interfaces import CameraFormat, Imported
 from opencsp_calib.lens_fit import LensFit, fit
 from opencsp_calib.models import LENS_MODELS
@@ -92,27 +94,20 @@ def recognise(path: str | PathLike[str], formats: Mapping[str, CameraFormat], na
     Raises
     ------
     InputError
-        If there is no such file, or the user named no format that reads.
+        If there is no such file, it cannot be read, or the user named no format that reads.
     FileFormatError
-        If no format, or more than one, recognises the file; the message lists them.
+        If no format, or more than one, recognises the file: the message lists them; or it is HDF5 and damaged.
     MissingDependencyError
         If the format cannot be read here.
     """
     path = Path(path)
-    try:
-        mode = path.stat().st_mode
-    except FileNotFoundError:
-        raise InputError(f"{path} does not exist") from None
-    except (OSError, ValueError) as error:  # a name too long, a circle of links, a null in the name
-        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
-    if stat.S_ISDIR(mode):
-        raise InputError(f"{path} is a folder; name the camera file in it")
-    if not stat.S_ISREG(mode):
-        raise InputError(f"{path} is not a regular file")
+    _check_readable(path)
     readable = {key: format_ for key, format_ in formats.items() if format_.reads}
     if name is not None and name not in readable:
         raise InputError(f"no readable format is called {name!r}; there are {', '.join(sorted(readable))}")
     found = [readable[name]] if name is not None else [f for f in readable.values() if _recognised(f, path)]
+    if not found and like_hdf5(path):
+        load_camera(path)  # of our own format, the reader says what is wrong
     if not found:
         raise FileFormatError(
             f"{path} is no camera file of a format we know; `opencsp-calib formats` lists them, --from names one"
@@ -124,6 +119,21 @@ def recognise(path: str | PathLike[str], formats: Mapping[str, CameraFormat], na
     if missing:
         raise MissingDependencyError(f"{path} ({found[0].title}) cannot be read here: {missing}")
     return found[0]
+
+
+def _check_readable(path: Path) -> None:
+    try:
+        mode = path.stat().st_mode
+        if stat.S_ISREG(mode):
+            path.open("rb").close()
+    except FileNotFoundError:
+        raise InputError(f"{path} does not exist") from None
+    except (OSError, ValueError) as error:  # no permission, a name too long, a circle of links, a null in the name
+        raise InputError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    if stat.S_ISDIR(mode):
+        raise InputError(f"{path} is a folder; name the camera file in it")
+    if not stat.S_ISREG(mode):
+        raise InputError(f"{path} is not a regular file")
 
 
 def _recognised(format_: CameraFormat, path: Path) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from opencsp_calib import board_shape as shapes
-from opencsp_calib import hdf5, selecting
+from opencsp_calib import hdf5_reading, selecting
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
@@ -61,7 +61,7 @@ def board_from(text: str) -> Board:
     path = Path(text)
     if path.suffix.lower() == ".json":
         return read_board_file(path, installed().board)
-    if path.suffix.lower() in hdf5.EXTENSIONS:
+    if path.suffix.lower() in hdf5_reading.EXTENSIONS:
         return load_calibration(path).board
     return installed().board(text)
 

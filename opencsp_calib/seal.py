@@ -45,7 +45,7 @@ def check_seal(path: str | os.PathLike[str]) -> None:
             return
         expected = _seal_of(file, left)
     if found != expected:
-        raise FileFormatError(f"{path} is damaged: its checksum does not fit its contents; take a copy of it")
+        raise FileFormatError(f"{path} is damaged: its checksum does not fit its contents; use another copy of it")
 
 
 def _seal_of(file: BinaryIO, length: int) -> bytes:

@@ -15,7 +15,7 @@ PLUGINS = ROOT / "plugins"
 
 TIERS = (
     "errors process_setting",
-    "arrays atomic native opencv blas processes provenance seal hdf5_writing",
+    "arrays atomic native opencv blas processes provenance seal hdf5_reading hdf5_writing",
     "models",
     "camera rotations convex_hull board",
     "pose",

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import stat
 from pathlib import Path
@@ -13,6 +14,7 @@ from command_line import QUICK, answer, complaint
 from worlds import SmallWorld
 
 from opencsp_calib.cli import run
+from opencsp_calib.hdf5_calibration import load_observations, save_observations
 from opencsp_calib.images import write_image
 
 
@@ -82,6 +84,11 @@ def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, c
     np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
+def test_an_observations_file_is_not_named_as_something_else(tmp_path: Path, capsys) -> None:
+    said = complaint(capsys, "detect", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / "seen.csv")
+    assert "seen.csv would be HDF5 under another name: let its name end in .h5" in said
+
+
 @pytest.mark.parametrize("name", ["camera.yaml", "camera.JSON", "camera.txt", "camera.png", "camera.html"])
 def test_a_camera_file_is_not_named_like_another_format(name, tmp_path: Path, capsys) -> None:
     said = complaint(capsys, "calibrate", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / name)
@@ -127,15 +134,41 @@ def test_a_folder_that_may_not_be_written(photographs: Path, tmp_path: Path, cap
     assert "no permission" in line
 
 
-def test_foreign_and_damaged_files(camera_file: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_foreign_and_damaged_files_say_what_they_are(
+    camera_file: Path, photographs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with h5py.File(tmp_path / "foreign.h5", "w") as file:
         file["Data/x"] = 3
-    damaged = bytearray(camera_file.read_bytes())
-    damaged[len(damaged) // 2 :] = b""
-    (tmp_path / "damaged.h5").write_bytes(damaged)
-    for name in ("foreign.h5", "damaged.h5"):
-        assert name in complaint(capsys, "show", tmp_path / name)
-        assert name in complaint(capsys, "solve", tmp_path / name)
+    seen = tmp_path / "seen.h5"
+    save_observations(load_observations(camera_file), seen)
+    whole = camera_file.read_bytes()
+    (tmp_path / "cut.h5").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "cut").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "changed.h5").write_bytes(whole[:3000] + b"\xff\xfe" + whole[3002:])
+    (tmp_path / "empty.h5").write_bytes(b"")
+    (tmp_path / "text.h5").write_text("hello")
+    board = ("--board", SmallWorld.spec)
+    for name, words in (
+        ("foreign.h5", "has no (group /Camera|observations)"),
+        ("cut.h5", r"is a damaged HDF5 file: use another copy of it \(truncated file"),
+        ("cut", r"is a damaged HDF5 file: use another copy of it \(truncated file"),
+        ("changed.h5", "is damaged: its checksum does not fit its contents; use another copy of it"),
+        ("empty.h5", "is empty: use another copy of it"),
+        ("text.h5", "is not HDF5, .*: it is damaged, or another file is meant"),
+        ("seen.h5", "holds what was seen .*, but no camera: `opencsp-calib solve .*seen.h5 -o camera.h5` calibrates"),
+    ):
+        file = tmp_path / name
+        for command in (
+            ("show", file),
+            ("compare", file, camera_file),
+            ("convert", file, tmp_path / "c.yaml"),
+            ("check", file, photographs),
+            ("solve", file),
+            ("validate", file),
+            ("calibrate", photographs, *board, "--guess", file),
+        ):
+            if name != "seen.h5" or command[0] not in ("solve", "validate"):
+                assert re.search(f"{name}:? ({words})", complaint(capsys, *command)), command
 
 
 def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -128,7 +128,7 @@ def test_corners_that_cannot_be_are_refused_by_name(name: str, value: float, wha
 def test_observations_alone_come_back_and_have_no_camera(tmp_path: Path) -> None:
     save_observations(observations(BOARDS[0]), tmp_path / "o.h5")
     assert len(load_observations(tmp_path / "o.h5").used) == 2
-    with pytest.raises(FileFormatError, match="no group /Camera"):
+    with pytest.raises(FileFormatError, match="but no camera: `opencsp-calib solve"):
         Camera.load(tmp_path / "o.h5")
 
 

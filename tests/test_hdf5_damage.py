@@ -103,7 +103,10 @@ def test_no_file_and_not_hdf5(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         Camera.load(tmp_path / "none.h5")
     (tmp_path / "text.h5").write_text("hello")
-    with pytest.raises(FileFormatError, match="not a camera file"):
+    with pytest.raises(FileFormatError, match=r"text.h5 is not HDF5, .* another file is meant"):
+        Camera.load(tmp_path / "text.h5")
+    (tmp_path / "text.h5").write_text("")
+    with pytest.raises(FileFormatError, match=r"text.h5 is empty"):
         Camera.load(tmp_path / "text.h5")
 
 

@@ -145,8 +145,8 @@ COMMANDS = (calibrate, detect, solve)
 
 def _as_before(file: Path) -> dict[str, Any]:
     """How a camera file was solved; nothing for a file of observations only."""
-    from opencsp_calib.hdf5 import opened
     from opencsp_calib.hdf5_calibration import load_calibration
+    from opencsp_calib.hdf5_reading import opened
 
     with opened(file) as content:
         if "Camera" not in content:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize, camera_in
+from opencsp_calib.cli.camera_files import CameraFile, CameraName, ImageSize
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
 from opencsp_calib.cli.finding import detected_aloud
 from opencsp_calib.cli.targets import check_targets
@@ -60,11 +60,12 @@ def check(
 ) -> None:
     """Check whether a camera is still good for photographs it has not seen."""
     from opencsp_calib import pipeline
-    from opencsp_calib.camera_files import calibration_in
+    from opencsp_calib.camera_files import read_camera_file
     from opencsp_calib.check import check as checked
 
-    known = camera_in(camera, name, image_size)
-    calibration = calibration_in(camera)
+    opened = read_camera_file(camera, name, image_size=image_size)
+    say_problems(opened.imported.notes)
+    known, calibration = opened.camera, opened.calibration
     observations = _observed(images, board, jobs, calibration.observations.board if calibration else None)
     found = checked(known, observations, lambda views: pipeline.solve(views, known.model), calibration)
     say(f"{known.name}: {found.verdict}")
@@ -121,9 +122,9 @@ def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Boa
 
 
 def _is_file(images: list[str]) -> bool:
-    from opencsp_calib.hdf5 import EXTENSIONS
+    from opencsp_calib.hdf5_reading import like_hdf5
 
-    return len(images) == 1 and Path(images[0]).suffix.lower() in EXTENSIONS
+    return len(images) == 1 and like_hdf5(Path(images[0]))
 
 
 def _say_validation(found: "Validation") -> None:

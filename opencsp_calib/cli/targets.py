@@ -16,29 +16,28 @@ HTML = (".html", ".htm")
 def check_targets(output: Path | None = None, report: Path | None = None) -> None:
     """Before any work: whether its results can be written, and have names that say what they are."""
     from opencsp_calib.atomic import check_writable
-    from opencsp_calib.hdf5 import EXTENSIONS
+    from opencsp_calib.hdf5_reading import EXTENSIONS
 
     for path in (output, report):
         if path is not None:
             check_writable(path)
     if output and output.suffix.lower() not in ("", *EXTENSIONS):
-        _check_no_other_format(output)
+        raise InputError(_named_otherwise(output))
     if report and report.suffix.lower() not in HTML:
         raise InputError(f"{report}: a report is HTML; let its name end in .html")
 
 
-def _check_no_other_format(output: Path) -> None:
+def _named_otherwise(output: Path) -> str:
+    """What is wrong with an HDF5 file of that name."""
     from opencsp_calib.images import EXTENSIONS as OF_IMAGES
     from opencsp_calib.registry import installed
 
     ending = output.suffix.lower()
     titles = [form.title for form in installed().camera_formats.values() if ending in form.extensions]
     titles += ["an image"] * (ending in OF_IMAGES) + ["a report"] * (ending in HTML)
-    if titles:
-        raise InputError(
-            f"{output} would be HDF5 under the name of something else ({', '.join(titles)}): let its name end in .h5; "
-            "`opencsp-calib convert` then writes other formats"
-        )
+    named = f"the name of something else ({', '.join(titles)})" if titles else "another name"
+    hint = "; `opencsp-calib convert` then writes a camera in other formats" if titles else ""
+    return f"{output} would be HDF5 under {named}: let its name end in .h5{hint}"
 
 
 def check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:

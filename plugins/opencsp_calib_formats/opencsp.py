@@ -4,7 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from opencsp_calib import Camera, InputError
-from opencsp_calib.hdf5 import EXTENSIONS, opened, read_camera, save_camera
+from opencsp_calib.hdf5 import read_camera, save_camera
+from opencsp_calib.hdf5_reading import EXTENSIONS, opened
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.reading import FileFormat, naming, only_one
 
