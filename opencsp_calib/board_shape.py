@@ -85,10 +85,11 @@ def decide(observations: Observations, options: SolveOptions, run: Run, *, aspec
 def solve_with_aspect(
     observations: Observations, options: SolveOptions, run: Run, *, aspect_given: bool = False
 ) -> Calibration:
-    """Solve as asked; but where the shape is free and no view is turned, with square pixels, saying so.
+    """Solve as asked; but where the board's shape is solved for and no view is turned, with square pixels, saying so.
 
     Where all views hold the board the same way up, fy/fx and the ratio of the board's pitches cannot be told apart.
-    Nearly every sensor has square pixels; few boards have the pitch they should have.
+    Nearly every sensor has square pixels; few boards have the pitch they should have. A smooth warp has a ratio of
+    pitches as well.
 
     Parameters
     ----------
@@ -105,7 +106,7 @@ def solve_with_aspect(
         that the seed would not allow.
     """
     assumed: tuple[Problem, ...] = ()
-    if options.board_shape == "free" and not aspect_given:
+    if options.board_shape != "flat" and not aspect_given:
         camera = initial_camera(observations, "pinhole", options.guess)
         assumed = _assumed_square(initial_poses(camera, observations))
         options = replace(options, pixel_aspect=1.0) if assumed else options

@@ -83,9 +83,12 @@ def conclusion(problems: Sequence[Problem]) -> Verdict:
 def _poor_rms(calibration: Calibration) -> Problem | None:
     if calibration.rms_px <= RMS_LIMIT_PX:
         return None
+    doubted = "the board's columns, rows and flatness"
+    if not calibration.camera.distortion.size:
+        doubted += f", and take a lens model with distortion, which {calibration.camera.model} has not"
     message = (
         f"the rms of {calibration.rms_px:.2f} px is over {RMS_LIMIT_PX:.1f} px, a poor calibration: discard the worst "
-        "images, retake them and repeat; if all are bad, check the board's columns, rows and flatness"
+        f"images, retake them and repeat; if all are bad, check {doubted}"
     )
     return Problem("poor-rms", message)
 
@@ -167,15 +170,21 @@ def _one_range(whole: SetQuality) -> Problem | None:
 
 
 def _aspect(calibration: Calibration) -> Problem | None:
+    if calibration.options.pixel_aspect is not None:  # as somebody wanted it
+        return None
     fx, fy = calibration.camera.params[:2]
     (a, b), (_, d) = calibration.covariance[:2, :2]
     sigma = np.sqrt(max(a + d - 2 * b, 0.0))
     if not (sigma > 0 and abs(fx - fy) > max(ASPECT_SIGMAS * sigma, LEAST_ASPECT * fx)):
         return None
+    cure = (
+        "the board's spacing may differ in x and y: solve for its shape, or measure it"
+        if calibration.options.board_shape == "flat"
+        else "hold the pixel aspect at square unless you know better"
+    )
     message = (
         f"fx and fy differ by {fx - fy:+.3g} px, which is known to {sigma:.2g} px (they are known together, not one by "
-        "one); most sensors have square pixels, so the board's spacing may differ in x and y: solve for its shape, or "
-        "measure it"
+        f"one); most sensors have square pixels, so {cure}"
     )
     return Problem("fx-fy-differ", message)
 

@@ -27,6 +27,9 @@ ABILITIES = {
     "robust": "leave out outlying corners",
 }
 MIN_VIEWS = 2  # of a flat board; one view of a plane does not determine a camera
+SIMPLE = 5  # distortion coefficients, which most sets of photographs tell
+SIMPLER = "take a simpler lens model, such as opencv4, or more views that reach the image's corners"
+ADVICE = "check the board's description and the photographs, add tilted views or take a simpler model"
 SHORTEST_FOCAL = 0.05  # of the image's longer side: a fisheye that sees all around has 0.16
 
 
@@ -111,14 +114,13 @@ def finished(
         folds back.
     """
     engine = f"{solver.name} {solver.version()}"
-    advice = "check the board's description and the photographs, add tilted views or take a simpler model"
     numbers = np.concatenate([params, np.ravel(rotations), np.ravel(translations)])
     size = np.array(observations.image_size)
     if not np.isfinite(numbers).all() or not (params[:2] > SHORTEST_FOCAL * size.max()).all():
-        raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {advice}")
+        raise CalibrationFailedError(f"{engine} found no solution for {model!r}: {ADVICE}")
     if (np.abs(params[2:4] - size / 2) > 1.5 * size).any():
         x, y = params[2:4]
-        message = f"{engine} puts the principal point at ({x:.0f}, {y:.0f}), far outside of the image: {advice}"
+        message = f"{engine} puts the principal point at ({x:.0f}, {y:.0f}), far outside of the image: {ADVICE}"
         raise CalibrationFailedError(message)
     name = options.guess.name if options.guess else "camera"
     calibration = Calibration(
@@ -131,11 +133,23 @@ def finished(
         outliers=outliers,  # type: ignore[arg-type]  # None stands for none
         problems=problems,
     )
-    for view, residuals, outlying in zip(observations.used, calibration.residuals, calibration.outliers, strict=True):
-        lost = int(np.isnan(residuals[~outlying]).any(axis=1).sum())
-        if lost:
-            raise CalibrationFailedError(
-                f"{engine} found a camera that cannot see {lost} of the corners of {view.image}: they are behind it, "
-                f"or where {model!r} folds back; {advice}"
-            )
+    _check_seen(calibration)
     return calibration
+
+
+def _check_seen(calibration: Calibration) -> None:
+    """A camera that has no image of a corner that it was solved from is none."""
+    camera, board, views = calibration.camera, calibration.board, calibration.observations.used
+    parts = zip(views, calibration.cam_from_board, calibration.residuals, calibration.outliers, strict=True)
+    for view, pose, residuals, outliers in parts:
+        lost = np.isnan(residuals).any(axis=1) & ~outliers
+        if not lost.any():
+            continue
+        corners = f"{lost.sum()} of the corners of {view.image}"
+        if (pose.transform(board.points[view.detection.ids[lost]])[:, 2] <= 0).any():
+            raise CalibrationFailedError(f"{calibration.solver} found a camera that has {corners} behind it: {ADVICE}")
+        cure = f"{camera.model!r} has more coefficients than these photographs tell: {SIMPLER}"
+        raise CalibrationFailedError(
+            f"{calibration.solver} found a camera whose distortion folds back inside the image, as no lens does, so "
+            f"that it cannot see {corners}; {cure if len(camera.distortion) > SIMPLE else ADVICE}"
+        )

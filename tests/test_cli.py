@@ -69,6 +69,13 @@ def test_detect_then_solve_is_calibrate(photographs: Path, tmp_path: Path, capsy
     assert solved["output"] == str(out)
 
 
+def test_whether_to_use_it_is_said_last(camera_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for command in ("show", "solve"):
+        assert run([command, str(camera_file)]) == 0
+        lines = [line for line in capsys.readouterr().err.splitlines() if "not saved" not in line]
+        assert lines[-1].startswith("A good calibration: ")
+
+
 def test_how_corners_are_weighed_is_asked_for_and_kept(camera_file: Path, tmp_path: Path) -> None:
     for asked, weights, robust in (("--weights=equal --no-robust", "equal", False), ("--robust", "covariance", True)):
         out = tmp_path / "c.h5"

@@ -83,6 +83,12 @@ def test_a_large_rms_names_the_views() -> None:
     bad = result(WORLD.poses, noise_px=1.2)
     assert {"poor-rms", "poor-view"} <= codes(bad)
     assert verdict(bad).level == "bad"
+    assert "a lens model with distortion" not in verdict(bad).sentence
+    pinhole = Camera("c", "pinhole", WORLD.camera.params[:4] * 1.01, WORLD.camera.image_size)
+    assert (
+        "a lens model with distortion"
+        in verdict(replace(bad, camera=pinhole, residuals=None, covariance=None, covariance_residual=None)).sentence
+    )
 
 
 def test_unequal_focal_lengths_are_said_only_beyond_their_sigmas() -> None:
@@ -91,6 +97,10 @@ def test_unequal_focal_lengths_are_said_only_beyond_their_sigmas() -> None:
     assert "fx-fy-differ" in codes(result(WORLD.poses, camera=replace(WORLD.camera, params=off)))
     off[0] -= 2.5
     assert "fx-fy-differ" not in codes(result(WORLD.poses, camera=replace(WORLD.camera, params=off)))
+    held = replace(
+        result(WORLD.poses, camera=replace(WORLD.camera, params=off + 3.0)), options=SolveOptions(pixel_aspect=1.1)
+    )
+    assert "fx-fy-differ" not in codes(held)
     certain = {"covariance": np.diag(SIGMA**2) * 1e-8}
     for ratio, said in ((1.00002, True), (1.000009, False)):  # a hundredth of a thousandth matters to nobody
         off[0] = ratio * off[1]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.console import print_json, progress_bar, say, say_problems, say_table
+from opencsp_calib.cli.console import print_json, progress_bar, say, say_judgement, say_table
 from opencsp_calib.cli.finding import detected_aloud, kept_beside
 from opencsp_calib.cli.solving_options import with_solving_options
 from opencsp_calib.cli.targets import check_not_input, check_targets
@@ -204,7 +204,6 @@ def _finish(
 ) -> None:
     """Save, report, and tell."""
     from opencsp_calib.hdf5_calibration import save_calibration
-    from opencsp_calib.judgement import judge
     from opencsp_calib.summary import calibration_as_json
 
     if output:
@@ -214,7 +213,7 @@ def _finish(
 
         write_report(result, report, before=before)
     _say_result(result, before)
-    say_problems(judge(result))
+    say_judgement(result)
     for what, path in (("camera", output), ("report", report)):
         if path:
             say(f"{what} saved: {path}")

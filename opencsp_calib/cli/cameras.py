@@ -13,7 +13,7 @@ from opencsp_calib.cli.camera_files import (
     ImageSize,
     camera_in,
 )
-from opencsp_calib.cli.console import print_json, progress_bar, say, say_problems, say_table
+from opencsp_calib.cli.console import print_json, progress_bar, say, say_judgement, say_problems, say_table
 from opencsp_calib.errors import InputError
 
 
@@ -38,11 +38,9 @@ def show(
         say(f"{key}: {value}")
     say_problems(opened.imported.notes)
     if calibration:
-        from opencsp_calib.judgement import judge
-
         views = len(calibration.observations.used)
         say(f"calibrated by {calibration.solver} from {views} views, rms {calibration.rms_px:.4f} px")
-        say_problems(judge(calibration))
+        say_judgement(calibration)
     if json:
         print_json(camera_as_json(shown, sigma))
 

@@ -13,6 +13,7 @@ from opencsp_calib.errors import InputError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from opencsp_calib.calibration import Calibration
     from opencsp_calib.detecting import Progress
     from opencsp_calib.detection import Observations, Problem
 
@@ -22,6 +23,7 @@ __all__ = [
     "print_json",
     "progress_bar",
     "say",
+    "say_judgement",
     "say_problems",
     "say_table",
     "say_unused",
@@ -52,6 +54,15 @@ def say_problems(problems: "tuple[Problem, ...]") -> None:
 
     for problem in problems:
         say(f"{'note' if problem.code in REMARKS else 'warning'} [{problem.code}] {problem.message}")
+
+
+def say_judgement(calibration: "Calibration") -> None:
+    """What a person should know about a calibration, and last, for it is read first, whether to use it."""
+    from opencsp_calib.judgement import conclusion, judge
+
+    problems = judge(calibration)
+    say_problems(problems)
+    say(conclusion(problems).sentence)
 
 
 def say_table(header: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from opencsp_calib.cli import arguments as args
-from opencsp_calib.cli.console import detection_progress, print_json, progress_bar, say, say_problems, say_table
+from opencsp_calib.cli.console import detection_progress, print_json, progress_bar, say, say_judgement, say_table
 
 if TYPE_CHECKING:
     from opencsp_calib.calibration import Calibration
@@ -61,7 +61,6 @@ def demo(
     from opencsp_calib.demo import make_demo
     from opencsp_calib.detecting import usable_cores
     from opencsp_calib.hdf5_calibration import save_calibration
-    from opencsp_calib.judgement import judge
     from opencsp_calib.report import write_report
 
     started = time.perf_counter()
@@ -75,7 +74,7 @@ def demo(
     write_report(calibration, folder / "report.html")
     difference = compare(calibration.camera, world.camera)
     _say_demo(calibration, world.camera, difference)
-    say_problems(judge(calibration))
+    say_judgement(calibration)
     say(f"rendered in {rendered - started:.1f} s, calibrated in {solved - rendered:.1f} s")
     say(f"camera saved: {folder / 'camera.h5'}")
     say(f"report saved: {folder / 'report.html'}; open it in a browser")
