@@ -67,14 +67,13 @@ def build(page: "Page") -> Callable[[], None]:
 
 
 def _said(now: Settings) -> str:
-    """What is wrong with the board, once all of it is typed; before, what grid points are."""
-    if now.board_kind in BY_FIELDS and not (now.grid_x and now.grid_y and now.square_mm):
-        checkerboard = now.board_kind == "checkerboard"
-        return "Grid points are the inner corners, where two black squares meet." if checkerboard else ""
+    """What is wrong with the first field that is wrong; until all of the board is typed, else, what grid points are."""
     try:
-        now.board()
+        now.check_typed()
     except InputError as error:
         return str(error)
+    if now.board_kind == "checkerboard" and not now.is_complete:
+        return "Grid points are the inner corners, where two black squares meet."
     return ""
 
 

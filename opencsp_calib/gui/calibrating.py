@@ -31,6 +31,7 @@ def build(page: "Page") -> Callable[[], None]:
         calibrate(session)
 
     solve = action("Calibrate Camera", begin, "calibrate")
+    stale = ui.label("Something above was changed since: calibrate again.").classes("hint")
     with ui.element("div").classes("figure"):
         ui.label("Overall rms").classes("quiet")
         rms = ui.label().props("data-testid=rms").classes("value")
@@ -44,6 +45,7 @@ def build(page: "Page") -> Callable[[], None]:
     def refresh() -> None:
         solved = session.calibration
         solve.set_enabled(session.can_calibrate)
+        stale.set_visibility(session.can_calibrate and solved is not None and not session.is_solved)
         rms.set_text(f"{solved.rms_px:.4f} px" if solved else "not yet known")
         worst.fill(_worst(session))
         worst.set_visibility(solved is not None)

@@ -20,8 +20,15 @@ export default {
     },
     async send(file) {
       if (!file) return;
-      const answer = await fetch(`cameras?${new URLSearchParams({ name: file.name })}`, { method: "PUT", body: file });
-      this.$emit("received", answer.ok ? (await answer.json()).path : "");
+      const told = { name: file.name, path: "", wrong: "" };
+      try {
+        const answer = await fetch(`cameras?${new URLSearchParams({ name: file.name })}`, { method: "PUT", body: file });
+        const { path, detail } = await answer.json();
+        Object.assign(told, answer.ok ? { path } : { wrong: detail });
+      } catch {
+        told.wrong = "it cannot be read, or is a folder, or the connection is lost";
+      }
+      this.$emit("received", told);
     },
   },
 };

@@ -29,7 +29,7 @@ def build(page: "Page") -> Callable[[], None]:
 
     def refresh() -> None:
         search.set_enabled(session.can_find)
-        view.set_enabled(bool(session.views))
+        view.set_enabled(session.observations is not None)
         stale.set_visibility(session.observations is not None and not session.is_found and not session.busy)
 
     return refresh

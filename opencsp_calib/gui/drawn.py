@@ -1,11 +1,14 @@
 """Sections of the report on the page: made aside, when they are first looked at, once for each result."""
 
 import asyncio
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from nicegui import background_tasks, ui
+
+from opencsp_calib.errors import CalibError
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -16,7 +19,7 @@ DRAWING = ThreadPoolExecutor(1, thread_name_prefix="drawing")
 """One at a time, because matplotlib's settings are global."""
 
 
-def drawn(key: Callable[[], Hashable], make: Callable[[], str]) -> Callable[[], None]:
+def drawn(key: Callable[[], Any], make: Callable[[], str]) -> Callable[[], None]:
     """An element with HTML that is made in another thread whenever its key is a new one, and empty where it is None.
 
     Returns
@@ -27,8 +30,11 @@ def drawn(key: Callable[[], Hashable], make: Callable[[], str]) -> Callable[[], 
     element = ui.html("", sanitize=False).classes("report")  # ours, and escaped where it is made
     shown: list[Any] = [None]
 
-    async def draw(wanted: Hashable) -> None:
-        content = await asyncio.get_running_loop().run_in_executor(DRAWING, make)
+    async def draw(wanted: Any) -> None:
+        try:
+            content = await asyncio.get_running_loop().run_in_executor(DRAWING, make)
+        except CalibError as error:
+            content = f'<p class="quiet">This cannot be drawn: {escape(str(error))}</p>'
         if shown[0] == wanted and not element.is_deleted:
             element.set_content(content)
 
@@ -48,6 +54,6 @@ def of_calibration(page: "Page", make: Callable[..., str]) -> Callable[[], None]
     """The same of the session's calibration, which `make` takes."""
     session = page.session
     return drawn(
-        lambda: None if session.calibration is None else id(session.calibration),
+        lambda: session.calibration,
         lambda: make(session.calibration) if session.calibration else "",
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 from nicegui.element import Element
@@ -37,7 +37,7 @@ def build(page: "Page") -> Callable[[], None]:
             entry = CameraInput()
             place = field("Camera file", "", lambda _: None, "camera-file", "camera.h5")
             with ui.expansion("Where the file does not tell").props("dense").classes("more") as more:
-                name = field("Which of several cameras", "", lambda _: None)
+                name = field("Which of several cameras", "", lambda _: None, "which-camera")
                 size = field("Image size, such as 1626x1236", "", lambda _: None)
                 form = field("Format", "", lambda _: None)
             ui.button("Open", on_click=lambda: opened()).props("no-caps unelevated data-testid=open-camera").classes(
@@ -50,8 +50,13 @@ def build(page: "Page") -> Callable[[], None]:
 
     def read() -> None:
         path = within(session.folder, place.value)
-        file = read_camera_file(path, name.value or None, form.value or None, size.value or None)
-        chosen.path, chosen.file = path, file
+        asked: dict[str, Any] = {
+            "name": name.value or None,
+            "format_name": form.value or None,
+            "image_size": size.value or None,
+        }
+        file = read_camera_file(path, **asked)
+        chosen.asked, chosen.file = {"path": str(path), **asked}, file
         told.set_content(_told(file))
         chosen.tell("")
         session.say(f"{shown(session.folder, path)} is open.")
@@ -65,7 +70,10 @@ def build(page: "Page") -> Callable[[], None]:
             page.refresh()
 
     def received(event: GenericEventArguments) -> None:
-        place.set_value(event.args)
+        if event.args["wrong"]:
+            session.say(f"{event.args['name']} cannot be received: {event.args['wrong']}", "bad")
+            return
+        place.set_value(event.args["path"])
         opened()
 
     entry.on("received", received)

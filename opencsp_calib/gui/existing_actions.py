@@ -1,8 +1,9 @@
 """What can be done with an existing camera: check, compare, convert, undistort, solve again."""
 
 import asyncio
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,10 +17,11 @@ from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
 from opencsp_calib.gui.controls import choice, field, offer, quiet_action
 from opencsp_calib.gui.drawn import DRAWING
-from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.files import shown, with_ending, within
 from opencsp_calib.gui.kept import take_up
 from opencsp_calib.gui.news import Message
 from opencsp_calib.models import LENS_MODELS
+from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
     from opencsp_calib.gui.page import Page
@@ -32,9 +34,9 @@ LEVELS = {"ok": "good", "degraded": "doubt", "wrong": "bad"}
 
 @dataclass
 class Chosen:
-    """The camera file that is open, and where answers about it go."""
+    """The camera file that is open, by which arguments of `read_camera_file`, and where answers about it go."""
 
-    path: Path | None = None
+    asked: Mapping[str, Any] | None = None
     file: CameraFile | None = None
     answer: ui.html | None = None
 
@@ -60,7 +62,7 @@ def _check(page: "Page", chosen: Chosen) -> Refresh:
     async def work() -> None:
         found: dict[str, Any] = await session.job(
             "check",
-            camera=str(chosen.path),
+            camera=chosen.asked,
             images=[str(file.path) for file in session.selection.files],
             board=session.settings.spec if session.settings.is_complete else "",
         )
@@ -93,7 +95,7 @@ def _compare(page: "Page", chosen: Chosen) -> Refresh:
     async def run() -> None:
         try:
             if other.value.strip():
-                camera = read_camera_file(within(session.folder, other.value)).camera
+                camera = read_camera_file(within(session.folder, other.value), which.value or None).camera
             elif session.calibration:
                 camera = session.calibration.camera
             else:
@@ -110,6 +112,7 @@ def _compare(page: "Page", chosen: Chosen) -> Refresh:
 
     ui.html("<h2>Compare</h2>", sanitize=False)
     other = field("Other file; empty: the result here", "", lambda _: None, "compare-with")
+    which = field("Which of several cameras in it", "", lambda _: None, "compare-which")
     distance = field("Range in m; empty: at infinity", "", lambda _: None)
     return _needs_file(quiet_action("Compare", run, "compare-cameras"), chosen)
 
@@ -119,7 +122,8 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
 
     async def run() -> None:
         try:
-            path = within(session.folder, place.value.strip() or "converted")
+            endings = installed().camera_formats[form.value].extensions if form.value else ()
+            path = within(session.folder, with_ending(place.value.strip() or "converted", endings))
             if path.is_dir():
                 raise InputError("name the file to write")
             accepted = float(accept.value) if accept.value.strip() else None
@@ -152,9 +156,8 @@ def _solve_again(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
     def run() -> None:
-        if chosen.path is not None:
-            take_up(session, chosen.path)
-            page.show_tab("Calibrate")
+        take_up(session, chosen.opened.path)
+        page.show_tab("Calibrate")
 
     ui.html("<h2>Solve again</h2>", sanitize=False)
     ui.label("Takes the corners kept in the file to Calibrate, to be solved in another way.").classes("hint")
@@ -169,16 +172,24 @@ def _solve_again(page: "Page", chosen: Chosen) -> Refresh:
 def _undistort(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
-    async def work() -> None:
-        folder = within(session.folder, place.value.strip() or "undistorted")
+    async def work(folder: Path) -> None:
         images = [str(file.path) for file in session.selection.files]
-        await session.job("undistort", camera=str(chosen.path), images=images, folder=str(folder))
+        await session.job("undistort", camera=chosen.asked, images=images, folder=str(folder))
         session.message = Message(f"{len(images)} images saved in {shown(session.folder, folder)}", "good")
+
+    async def run() -> None:
+        try:
+            folder = within(session.folder, place.value.strip() or "undistorted")
+        except CalibError as error:
+            session.say(str(error), "bad")
+            return
+        if await may_write(folder):
+            session.start("Undistorting", partial(work, folder))
 
     ui.html("<h2>Undistort photographs</h2>", sanitize=False)
     ui.label("Takes the photographs under Calibrate, as a pinhole camera would have taken them.").classes("hint")
     place = field("Into the folder", "", lambda _: None, hint="undistorted")
-    button = quiet_action("Undistort", lambda: session.start("Undistorting", work), "undistort")
+    button = quiet_action("Undistort", run, "undistort")
 
     def refresh() -> None:
         button.set_enabled(chosen.file is not None and bool(session.selection.files) and not session.busy)

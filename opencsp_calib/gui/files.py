@@ -1,12 +1,13 @@
 """Which files the window may touch: those below the folder it was started for, links and ``..`` resolved."""
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from opencsp_calib.errors import InputError
 from opencsp_calib.images import ImageFile, find_images
 
-__all__ = ["file_name", "images_in", "shown", "within"]
+__all__ = ["file_name", "images_in", "shown", "with_ending", "within"]
 
 
 def within(folder: Path, text: str) -> Path:
@@ -46,6 +47,12 @@ def file_name(text: str, fallback: str) -> str:
     last = re.split(r"[/\\]", text)[-1]
     name = re.sub(r'[\x00-\x1f<>:"|?*]', "_", last).strip(" .")[:120]
     return name or fallback
+
+
+def with_ending(name: str, endings: Sequence[str]) -> str:
+    """A file's name that ends as its kind of file does: with the first of these endings, where it has none of them."""
+    ends = not endings or name.lower().endswith(tuple(endings))
+    return name if ends else str(Path(name)) + endings[0]
 
 
 def shown(folder: Path, path: Path) -> str:

@@ -80,7 +80,10 @@ class Guard:
 
 def _same_page(origin: str | None, host: str) -> bool:
     """Whether a request comes from a page of ours, or from no page at all."""
-    return origin is None or urlsplit(origin).netloc.lower() == host.lower()
+    try:
+        return origin is None or urlsplit(origin).netloc.lower() == host.lower()
+    except ValueError:
+        return False
 
 
 def _is_address(name: str) -> bool:

@@ -150,7 +150,7 @@ def report(tell: Tell, calibration: str, before: str, target: str) -> None:
     write_report(load_calibration(calibration), target, before=load_calibration(before) if before else None)
 
 
-def check(tell: Tell, camera: str, images: list[str], board: str) -> dict[str, Any]:
+def check(tell: Tell, camera: dict[str, Any], images: list[str], board: str) -> dict[str, Any]:
     """Hold a camera file against photographs; the board is by default that which it was calibrated with."""
     from opencsp_calib import pipeline
     from opencsp_calib.camera_files import read_camera_file
@@ -161,7 +161,7 @@ def check(tell: Tell, camera: str, images: list[str], board: str) -> dict[str, A
     def progress(done: int, total: int, _: View) -> None:
         tell({"done_images": done, "total": total})
 
-    opened = read_camera_file(camera)
+    opened = read_camera_file(**camera)
     known, calibration = opened.camera, opened.calibration
     if not (board or calibration):
         raise InputError("describe the board under Calibrate first: this camera file does not tell which it was")
@@ -172,7 +172,7 @@ def check(tell: Tell, camera: str, images: list[str], board: str) -> dict[str, A
     return found.as_json() | {"name": known.name, "reasons": [*found.reasons, *notes]}
 
 
-def undistort(tell: Tell, camera: str, images: list[str], folder: str) -> None:
+def undistort(tell: Tell, camera: dict[str, Any], images: list[str], folder: str) -> None:
     """Write photographs without their lens distortion into another folder."""
     from pathlib import Path
 
@@ -183,7 +183,7 @@ def undistort(tell: Tell, camera: str, images: list[str], folder: str) -> None:
     def progress(done: int, total: int) -> None:
         tell({"done_images": done, "total": total})
 
-    undistort_images(read_camera_file(camera).camera, find_images(images), Path(folder), progress)
+    undistort_images(read_camera_file(**camera).camera, find_images(images), Path(folder), progress)
 
 
 def fleet(tell: Tell, where: str, given: dict[str, str]) -> dict[str, Any]:

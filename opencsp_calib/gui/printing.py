@@ -14,7 +14,7 @@ from opencsp_calib.drawing import Drawing, write_board
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui.asking import may_write
 from opencsp_calib.gui.controls import action, choice, field, set_prop
-from opencsp_calib.gui.files import shown, within
+from opencsp_calib.gui.files import shown, with_ending, within
 from opencsp_calib.gui.session import Session
 from opencsp_calib.registry import installed
 
@@ -33,9 +33,9 @@ def build(page: "Page") -> Callable[[], None]:
     drawn: list[str] = [""]
 
     async def save() -> None:
-        name = place.value.strip() or "board"
+        endings = sorted(KINDS, key=lambda ending: ending != suffix.value)  # the one that is chosen first
         try:
-            path = within(session.folder, name if Path(name).suffix else name + suffix.value)
+            path = within(session.folder, with_ending(place.value.strip() or "board", endings))
             await _save(session, installed().board(spec.value.strip()), path)
         except CalibError as error:
             session.say(str(error), "bad")

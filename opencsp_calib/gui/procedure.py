@@ -21,7 +21,7 @@ def find_corners(session: Session) -> None:
 
 def calibrate(session: Session) -> None:
     """Solve for the camera from all views that are not removed."""
-    session.start("Calibrating", partial(_calibrate, session))
+    _calibrate_without(session, session.removed)
 
 
 def find_and_calibrate(session: Session) -> None:
@@ -29,21 +29,19 @@ def find_and_calibrate(session: Session) -> None:
 
     async def both() -> None:
         await _find_corners(session)
-        await _calibrate(session)
+        await _calibrate(session, session.removed)
 
     session.start("Finding corners and calibrating", both, len(session.selection.files))
 
 
 def remove(session: Session, names: Iterable[str]) -> None:
-    """Leave images out, and calibrate again."""
-    session.removed |= set(names)
-    calibrate(session)
+    """Leave images out, and calibrate again; they stay in where that fails."""
+    _calibrate_without(session, session.removed | set(names))
 
 
 def put_back(session: Session, names: Iterable[str]) -> None:
-    """Take images in again, and calibrate again."""
-    session.removed -= set(names)
-    calibrate(session)
+    """Take images in again, and calibrate again; they stay out where that fails."""
+    _calibrate_without(session, session.removed - set(names))
 
 
 async def _find_corners(session: Session) -> None:
@@ -69,8 +67,13 @@ async def _find_corners(session: Session) -> None:
     session.message = Message(text, "good" if found.used else "bad")
 
 
-async def _calibrate(session: Session) -> None:
+def _calibrate_without(session: Session, removed: frozenset[str]) -> None:
+    session.start("Calibrating", partial(_calibrate, session, removed))
+
+
+async def _calibrate(session: Session, removed: frozenset[str]) -> None:
     settings, target, new = session.settings, session.file("calibration"), session.file("new")
+    asked = session.asked_to_solve(removed)
     options = {
         "name": settings.camera_name.strip() or "camera",
         "record": settings.record,
@@ -79,7 +82,7 @@ async def _calibrate(session: Session) -> None:
     judged = await session.job(
         "solve",
         observations=str(session.file("observations")),
-        exclude=sorted(session.removed),
+        exclude=sorted(removed),
         options=settings.solving | options,
         guess=settings.guess and str(within(session.folder, settings.guess)),
         calibration=str(new),
@@ -90,5 +93,6 @@ async def _calibrate(session: Session) -> None:
     new.replace(target)
     solved = await asyncio.to_thread(load_calibration, target)
     session.before, session.calibration = session.calibration, solved
+    session.removed, session.solved_with = removed, asked
     text = f"Calibrated from {len(solved.observations.used)} views, rms {solved.rms_px:.4f} px. {judged['sentence']}"
     session.message = Message(text, LEVELS[judged["level"]])

@@ -15,9 +15,10 @@ from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_write
 from opencsp_calib.gui.controls import action, choice, field, offer, set_prop
-from opencsp_calib.gui.files import file_name, shown, within
+from opencsp_calib.gui.files import file_name, shown, with_ending, within
 from opencsp_calib.gui.news import Message
 from opencsp_calib.gui.session import Session
+from opencsp_calib.hdf5_reading import EXTENSIONS
 from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ __all__ = ["build"]
 
 HDF5, REPORT = "hdf5", "report"
 KINDS = {HDF5: "Camera file (HDF5)", REPORT: "Report (HTML)"}
+ENDINGS = {HDF5: EXTENSIONS, REPORT: (".html", ".htm")}
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -35,17 +37,13 @@ def build(page: "Page") -> Callable[[], None]:
     kind = choice("What", KINDS, HDF5, lambda _: refresh())
     place = field("Save as", "", lambda _: None, "save-as", "camera.h5")
 
-    def suffix() -> str:
-        ours = {HDF5: ".h5", REPORT: ".html"}
-        return ours.get(kind.value) or installed().camera_formats[kind.value].extensions[0]
-
-    def target() -> Path:
-        name = place.value.strip() or file_name(session.settings.camera_name, "camera")
-        return within(session.folder, name if Path(name).suffix else name + suffix())
+    def named(name: str) -> str:
+        endings = ENDINGS.get(kind.value) or installed().camera_formats[kind.value].extensions
+        return with_ending(name or file_name(session.settings.camera_name, "camera"), endings)
 
     async def save() -> None:
         try:
-            path = target()
+            path = within(session.folder, named(place.value.strip()))
             check_writable(path)
             if path in {file.path.resolve() for file in session.selection.files}:
                 raise InputError(f"{path.name} is one of the photographs; give another name")
@@ -63,7 +61,7 @@ def build(page: "Page") -> Callable[[], None]:
     def refresh() -> None:
         if session.offered:
             offer(kind, KINDS | session.offered.formats)
-        set_prop(place, "placeholder", file_name(session.settings.camera_name, "camera") + suffix())
+        set_prop(place, "placeholder", named(""))
         button.set_enabled(session.calibration is not None and not session.busy)
 
     return refresh

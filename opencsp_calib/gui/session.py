@@ -71,6 +71,7 @@ class Session:
         self.views: dict[str, dict[str, Any]] = {}  # by image, as `summary.view_as_json`
         self.looking = False  # whether the board is being looked for: views come in
         self.found_with: list[Any] = []
+        self.solved_with: list[Any] = []
         self.observations: Observations | None = None
         self.removed: frozenset[str] = frozenset()
         self.calibration: Calibration | None = None
@@ -101,6 +102,11 @@ class Session:
         return self.observations is not None and self.found_with == self.asked()
 
     @property
+    def is_solved(self) -> bool:
+        """Whether the calibration is of what was found, chosen and left out now."""
+        return self.calibration is not None and self.solved_with == self.asked_to_solve(self.removed)
+
+    @property
     def can_calibrate(self) -> bool:
         """Whether corners are found."""
         return self.is_found and not self.busy and any(v["status"] == "used" for v in self.views.values())
@@ -120,7 +126,8 @@ class Session:
 
     def forget_photographs(self) -> None:
         """Start again with none, and with no results."""
-        self.views, self.removed, self.found_with, self.kept = {}, frozenset(), [], ""
+        self.views, self.removed, self.kept = {}, frozenset(), ""
+        self.found_with, self.solved_with = [], []
         self.observations = self.calibration = self.before = None
         for name in ("observations.hdf5", "calibration.hdf5", "before.hdf5", "found.journal"):
             (self.own / name).unlink(missing_ok=True)
@@ -164,6 +171,7 @@ class Session:
             "sources": self.selection.sources,
             "kept": self.kept,
             "found_with": self.found_with,
+            "solved_with": self.solved_with,
             "removed": sorted(self.removed),
         }
         try:
@@ -240,6 +248,10 @@ class Session:
             return [self.kept]
         return [self.settings.spec, self.settings.finding, [str(file.path) for file in self.selection.files]]
 
+    def asked_to_solve(self, removed: frozenset[str]) -> list[Any]:
+        """What decides what is solved for: the corners found, views left out, and what is typed and chosen."""
+        return [self.found_with, sorted(removed), self.settings.as_json()]
+
     # --- the disk ---
 
     def file(self, name: str, extension: str = "hdf5") -> Path:
@@ -257,7 +269,7 @@ class Session:
             self.settings = Settings.from_json(content["settings"])
             self.selection.sources = tuple(str(source) for source in content["sources"])
             self.kept = str(content.get("kept", ""))
-            self.found_with = content["found_with"]
+            self.found_with, self.solved_with = content["found_with"], content.get("solved_with", [])
             self.removed = frozenset(str(name) for name in content["removed"])
             wrong = self.selection.look_up()
             with suppress(FileNotFoundError):

@@ -1,6 +1,7 @@
 """What a person types and chooses before calibrating, kept as typed, so that half a number is not lost."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -87,15 +88,38 @@ class Settings:
         BoardSpecError
             If they do not; the message says which field is wrong.
         """
-        if self.board_kind in BY_FIELDS:
-            for text, field in zip((self.grid_x, self.grid_y), COUNTED[self.board_kind], strict=True):
-                if not text.strip().isdecimal():
-                    raise BoardSpecError(f"{field} must be a whole number, such as 18, not {text!r}")
-            sizes = [(self.square_mm, "Square size")]
-            sizes += [(self.marker_mm, "Marker size")] if self.board_kind == "charuco" else []
-            for text, field in sizes:
-                _number(text, field)
+        for text, field, check in self._board_fields():
+            check(text.strip(), field)
         return installed().board(self.spec)
+
+    def check_typed(self) -> None:
+        """See that what has been typed so far can be understood; fields may be empty still.
+
+        Raises
+        ------
+        InputError
+            If it cannot; the message says which field is wrong.
+        """
+        typed = [(text.strip(), field, check) for text, field, check in self._board_fields()]
+        for text, field, check in typed:
+            if text:
+                check(text, field)
+        if all(text for text, _, _ in typed) and self.spec:
+            self.board()
+        _ = self.solving, self.leaving_out, self.record  # each refuses what it cannot understand
+
+    def _board_fields(self) -> list[tuple[str, str, Callable[[str, str], None]]]:
+        """What is typed into each field of the board, the field's name, and what it must be."""
+        if self.board_kind not in BY_FIELDS:
+            return []
+        columns, rows = COUNTED[self.board_kind]
+        markers = [(self.marker_mm, "Marker size", _check_length)] if self.board_kind == "charuco" else []
+        return [
+            (self.grid_x, columns, _check_count),
+            (self.grid_y, rows, _check_count),
+            (self.square_mm, "Square size", _check_length),
+            *markers,
+        ]
 
     @property
     def is_complete(self) -> bool:
@@ -142,11 +166,13 @@ class Settings:
         InputError
             If it is not told by numbers.
         """
-        asked = (("select", int), ("drop_worst", int), ("max_rms", float))
-        try:
-            return {key: kind(getattr(self, key)) for key, kind in asked if getattr(self, key).strip()}
-        except ValueError as error:
-            raise InputError(f"which views are left out is told by numbers: {error}") from None
+        asked: tuple[tuple[str, Callable[[str], float], float, str], ...] = (
+            ("select", int, 3, '"Keep the N most telling views" takes a whole number from 3 on'),
+            ("drop_worst", int, 0, '"Leave out the N worst views" takes a whole number'),
+            ("max_rms", float, 0, '"Leave out views above rms" takes a number of pixels'),
+        )
+        typed = [(key, getattr(self, key).strip(), kind, least, rule) for key, kind, least, rule in asked]
+        return {key: _number(text, kind, least, math.inf, rule) for key, text, kind, least, rule in typed if text}
 
     @property
     def record(self) -> dict[str, str]:
@@ -155,10 +181,13 @@ class Settings:
         Raises
         ------
         InputError
-            If a line is none.
+            If a line is none, or the size is no number.
         """
         notes = notes_from(line for line in self.notes.splitlines() if line.strip())
-        return notes | ({PIXEL_PITCH: f"{float(self.pixel_pitch_um):g}"} if self.pixel_pitch_um.strip() else {})
+        if not self.pixel_pitch_um.strip():
+            return notes
+        size = _number(self.pixel_pitch_um, float, 0.01, 1000, "Pixel size must be from 0.01 to 1000 µm, such as 3.45")
+        return notes | {PIXEL_PITCH: f"{size:g}"}
 
     def as_json(self) -> dict[str, Any]:
         """For the session file."""
@@ -177,11 +206,26 @@ class Settings:
 KNOWN = frozenset(field.name for field in fields(Settings))
 
 
-def _number(text: str, field: str) -> float:
+def _check_count(text: str, field: str) -> None:
+    if not (text.isascii() and text.isdecimal() and len(text) < 6):
+        raise BoardSpecError(f"{field} must be a whole number, such as 18, not {text!r}")
+
+
+def _check_length(text: str, field: str) -> None:
     try:
         value = float(text)
     except ValueError:
         value = 0.0
-    if not value > 0:
+    if not (math.isfinite(value) and value > 0):
         raise BoardSpecError(f"{field} must be a length in mm, such as 50, not {text!r}")
+
+
+def _number(text: str, kind: Callable[[str], float], least: float, most: float, rule: str) -> float:
+    """A number in a range, as `kind` reads it; else an InputError with the rule."""
+    try:
+        value = kind(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise InputError(f"{rule}, not {text.strip()!r}")
     return value

@@ -65,7 +65,7 @@ def build(page: "Page") -> Callable[[], None]:
     def refresh() -> None:
         views = session.observations.views if session.observations else ()
         index = next((n for n, view in enumerate(views) if view.image == page.image), 0)
-        key = (id(session.observations), id(session.calibration), index, order.value, arrows.value)
+        key = (session.observations, session.calibration, index, order.value, arrows.value)
         if key == shown[0]:
             return
         shown[0] = key

@@ -34,7 +34,7 @@ def test_only_who_has_the_token_is_let_in(server: Server) -> None:
     assert answer(server, socket_path, **upgrade) == 403
     for host in ("evil.example", f"evil.example:{urlsplit(own).port}", "127.0.0.1.evil.example", "", "[", "10.0.0.1"):
         assert answer(server, home, Host=host) == 403, host
-    for origin in ("http://evil.example", "null", f"https://evil.example/{own}", "http://127.0.0.1:1"):
+    for origin in ("http://evil.example", "null", f"https://evil.example/{own}", "http://127.0.0.1:1", "http://["):
         assert answer(server, home, Origin=origin) == 403, origin
     where = urlsplit(server.address)
     before = list(server.folder.rglob("*"))

@@ -1,5 +1,6 @@
 """What the window can do beside calibrating: old cameras, many cameras, boards, reports; and by the keyboard alone."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,8 +9,8 @@ from gui_window import Window, run_cli
 from worlds import SmallWorld
 
 from opencsp_calib import Camera
-from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.images import write_image
+from opencsp_calib.registry import installed
 
 pytestmark = pytest.mark.timeout(1200)
 
@@ -96,6 +97,7 @@ def test_a_camera_file_is_solved_again_and_views_are_left_out(calibrated: Window
     calibrated.click("calibrate")
     calibrated.until(lambda: "from 10 views" in calibrated.status)
     calibrated.type("drop-worst", "")
+    calibrated.until(lambda: calibrated.text_is_there("Something above was changed since: calibrate again."))
     calibrated.click("save-camera")
     calibrated.press("Overwrite")
     calibrated.until(lambda: calibrated.status == "Camera saved: to-solve-again.h5")
@@ -112,16 +114,21 @@ def test_an_existing_camera(small: Window, small_world: SmallWorld, tmp_path: Pa
     small.type("camera-file", "truth.h5")
     small.click("open-camera")
     small.until(lambda: small.text_is_there("800.000 px"))
-    write_camera_file(small_world.camera, tmp_path / "from-elsewhere.yaml", "opencv")
-    small.drop([tmp_path / "from-elsewhere.yaml"], ".narrow .drop")
-    small.until(lambda: small.status == "opencsp-calib-session/cameras/from-elsewhere.yaml is open.")
+    other = replace(small_world.camera, params=0.9 * small_world.camera.params)
+    two = {"1": other, "2": small_world.camera}
+    installed().camera_formats["colmap"].write(two, tmp_path / "cameras.txt")
+    small.drop([tmp_path / "cameras.txt"], ".narrow .drop")
+    small.until(lambda: small.status.endswith('choose one with "Which of several cameras": 1, 2'))
+    small.type("which-camera", "2")
+    small.click("open-camera")
+    small.until(lambda: small.status == "opencsp-calib-session/cameras/cameras.txt is open.")
     small.type("compare-with", "truth.h5")
     small.click("compare-cameras")
     small.until(lambda: small.text_is_there("at infinity: rms "))
     compared = small.browser.find_element("tag name", "body").text.split("at infinity: rms ")[1]
     assert float(compared.split()[0]) < 1e-6
     small.click("check-camera")
-    small.until(lambda: small.status == "Checked: small: ok")
+    small.until(lambda: small.status == "Checked: cameras 2: ok")
     small.picture("existing-camera")
     small.type("convert-to", "camera.json")
     small.click("convert-camera")
@@ -129,10 +136,19 @@ def test_an_existing_camera(small: Window, small_world: SmallWorld, tmp_path: Pa
     small.type("convert-to", "again.h5")
     small.click("convert-camera")
     small.until(lambda: small.status == "Camera saved: again.h5")
-    assert Camera.load(small.server.folder / "again.h5") == small_world.camera
+    again = Camera.load(small.server.folder / "again.h5")
+    np.testing.assert_allclose(again.params, small_world.camera.params, rtol=1e-12)
+    undistorted = small.server.folder / "undistorted"
+    undistorted.mkdir()
+    (undistorted / "01.png").write_bytes(b"mine")
     small.click("undistort")
+    small.press("Keep it")
+    small.until(lambda: not small.find_all(".q-dialog"))
+    assert (undistorted / "01.png").read_bytes() == b"mine"
+    small.click("undistort")
+    small.press("Overwrite")
     small.until(lambda: "12 images saved in undistorted" in small.status)
-    assert len(list((small.server.folder / "undistorted").glob("*.png"))) == 12
+    assert len(list(undistorted.glob("*.png"))) == 12
 
 
 def test_many_cameras(window: Window, photographs: Path) -> None:
@@ -174,12 +190,12 @@ def test_a_camera_is_no_file_name(window: Window, photographs: Path) -> None:
     (folder / "set").mkdir()
     for photograph in sorted(photographs.glob("*.png"))[:5]:
         (folder / "set" / photograph.name).write_bytes(photograph.read_bytes())
-    window.describe("../evil", 9, 6, 30)
+    window.describe("../evil v1.2", 9, 6, 30)
     window.type("photograph-folder", "set")
     window.press("Use")
     window.until(lambda: window.status == "5 photographs in set.")
     window.find_corners()
     window.calibrate()
     window.click("save-camera")
-    window.until(lambda: window.status == "Camera saved: evil.h5")
+    window.until(lambda: window.status == "Camera saved: evil v1.2.h5")
     assert set(folder.parent.iterdir()) == around
