@@ -8,6 +8,7 @@ which tells every page.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from importlib.resources import files
 from typing import TypeAlias
 
@@ -87,6 +88,7 @@ class Page:
         self._refreshers: dict[str, Refresh] = {}
         self._seldom: dict[str, Refresh] = {}
         self._always: list[Refresh] = []
+        self._connected = False
 
     def show_result(self, name: str) -> None:
         """Bring one of `RESULTS` to the front."""
@@ -159,12 +161,28 @@ class Page:
 
         return refresh
 
-    async def prepare(self) -> None:
-        """Do what need not wait until it is asked for, once the page is there."""
+    async def connected(self) -> None:
+        """Make ready what need not wait until it is asked for; later, make good what was lost with the connection."""
+        if self._connected:
+            await self._send_again()
+            return
+        self._connected = True
         await self.session.ask_plugins()
         # what the browser loads for these would come while both cores look for corners
         for name in BEFORE_CALIBRATION:
             self._refreshers[name]()
+
+    async def _send_again(self) -> None:
+        """Send every element as it is now.
+
+        After a connection is lost NiceGUI repeats what may not have arrived, but after what is newer: a line that has
+        changed meanwhile would keep its old words.
+        """
+        client = ui.context.client
+        with suppress(TimeoutError):
+            await client.run_javascript("return 0", timeout=60)  # answered when all that is repeated has arrived
+        for element in list(client.elements.values()):
+            element.update()
 
     def refresh(self) -> None:
         """Bring what can be seen up to date."""
@@ -186,7 +204,7 @@ def show(session: Session) -> None:
     page.build()
     page.refresh()
     session.changed.subscribe(page.refresh)
-    ui.context.client.on_connect(page.prepare)
+    ui.context.client.on_connect(page.connected)
 
 
 def _style(package: str) -> str:

@@ -59,7 +59,9 @@ class SettingFields:
         pause = "await new Promise((done) => setTimeout(done, 200));"
         try:
             values = await ui.context.client.run_javascript(f"{pause} return {{{fields}}};", timeout=60)
-        except TimeoutError:  # the page was closed or loaded again before it could answer
+        except TimeoutError:  # the page was loaded again before it could answer
+            return
+        if values is None:  # it was closed
             return
         for setting, made in typed.items():
             if isinstance(values.get(setting), str) and values[setting] != made.value:

@@ -101,6 +101,35 @@ def test_reload_in_the_middle_and_a_second_tab_lose_nothing(small: Window) -> No
     browser.switch_to.window(first)
 
 
+def test_what_was_lost_with_the_connection_comes_again(window: Window) -> None:
+    """What changes while nobody hears it, before and after the connection is known to be lost."""
+    browser = window.browser
+    first = browser.current_window_handle
+    browser.switch_to.new_window("tab")
+    second = browser.current_window_handle
+    browser.get(window.server.root)
+    window.until(lambda: browser.execute_script("return window.did_handshake"))
+
+    def change_it_elsewhere(name: str) -> None:
+        browser.switch_to.window(second)
+        window.type("photograph-folder", name)
+        window.press("Use")
+        window.until(lambda: name in window.status)
+        browser.switch_to.window(first)
+
+    browser.switch_to.window(first)
+    browser.execute_script("window.socket.io.engine.transport.ws.onmessage = () => {}")
+    change_it_elsewhere("older")
+    browser.execute_script("window.socket.io.reconnection(false); window.socket.io.engine.close()")
+    change_it_elsewhere("newer")
+    again = "manager.reconnection(true); manager.skipReconnect = false; manager.reconnect()"
+    browser.execute_script(f"const manager = window.socket.io; {again}")
+    window.until(lambda: "newer" in window.status)
+    browser.switch_to.window(second)
+    browser.close()
+    browser.switch_to.window(first)
+
+
 def test_a_place_that_cannot_be_written(calibrated: Window) -> None:
     folder = calibrated.server.folder
     (folder / "taken.h5").mkdir()
