@@ -1,4 +1,4 @@
-"""Sections of the report on the page: made aside, when they are first looked at, once for each result."""
+"""What takes a while to draw on the page: made aside, when it is first looked at, once for each result."""
 
 import asyncio
 from collections.abc import Callable
@@ -30,9 +30,12 @@ def drawn(key: Callable[[], Any], make: Callable[[], str]) -> Callable[[], None]
     element = ui.html("", sanitize=False).classes("report")  # ours, and escaped where it is made
     shown: list[Any] = [None]
 
+    def made(wanted: Any) -> str:
+        return make() if shown[0] == wanted else ""  # nobody waits for it any more
+
     async def draw(wanted: Any) -> None:
         try:
-            content = await asyncio.get_running_loop().run_in_executor(DRAWING, make)
+            content = await asyncio.get_running_loop().run_in_executor(DRAWING, made, wanted)
         except CalibError as error:
             content = f'<p class="quiet">This cannot be drawn: {escape(str(error))}</p>'
         if shown[0] == wanted and not element.is_deleted:

@@ -96,7 +96,8 @@ def _told(file: CameraFile) -> str:
     except CalibError as error:
         return f'<h1>{escape(file.name)}</h1><div class="verdict doubt">{escape(worded(str(error)))}</div>'
     solved = file.calibration
-    lines = parameter_lines(camera, solved.sigma if solved else None, file.record)
+    columns = ("parameter", "value", *(["± one standard deviation"] if solved else []))
+    lines = [line[: len(columns)] for line in parameter_lines(camera, solved.sigma if solved else None, file.record)]
     size = " × ".join(map(str, camera.image_size))
     about = f"{camera.model}, {size} px"
     if solved:
@@ -108,5 +109,5 @@ def _told(file: CameraFile) -> str:
     return (
         f'<h1>{escape(camera.name)}</h1><div class="subtitle">{escape(about)}</div>'
         + (f'<ul class="warnings">{listed}</ul>' if listed else "")
-        + table(("parameter", "value", "± one standard deviation"), lines)
+        + table(columns, lines)
     )

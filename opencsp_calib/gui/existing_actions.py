@@ -101,6 +101,7 @@ def _compare(page: "Page", chosen: Chosen) -> Refresh:
             else:
                 raise InputError("name another camera file, or calibrate first")
             range_m = float(distance.value) if distance.value.strip() else None
+            session.say("Comparing …")
             told = await asyncio.get_running_loop().run_in_executor(DRAWING, compared, camera, range_m)
         except ValueError:
             session.say(f"The range is a number of metres, not {distance.value!r}.", "bad")
@@ -127,11 +128,14 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
             if path.is_dir():
                 raise InputError("name the file to write")
             accepted = float(accept.value) if accept.value.strip() else None
+            session.say("Converting …")
             made = await asyncio.to_thread(convert, chosen.opened, fit.value or None, accepted)
             if await may_write(path):
                 write_camera_file(made.camera, path, form.value or None, made.record)
                 said = f" ({made.record['import fit']})" if made.fit else ""
                 session.say(f"Camera saved: {shown(session.folder, path)}{said}", "good")
+            else:
+                session.say(f"{shown(session.folder, path)} is as it was.")
         except ValueError:
             session.say("The accepted error is a number of pixels.", "bad")
         except CalibError as error:

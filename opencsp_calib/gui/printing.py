@@ -1,5 +1,6 @@
 """A board to print at true size: what it looks like, and as PDF, SVG or PNG."""
 
+import asyncio
 import base64
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +15,7 @@ from opencsp_calib.drawing import Drawing, write_board
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui.asking import may_write
 from opencsp_calib.gui.controls import action, choice, field, set_prop
+from opencsp_calib.gui.drawn import drawn
 from opencsp_calib.gui.files import shown, with_ending, within
 from opencsp_calib.gui.session import Session
 from opencsp_calib.registry import installed
@@ -30,7 +32,6 @@ KINDS = {".pdf": "PDF", ".svg": "SVG", ".png": "PNG, 300 dots an inch"}
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
-    drawn: list[str] = [""]
 
     async def save() -> None:
         endings = sorted(KINDS, key=lambda ending: ending != suffix.value)  # the one that is chosen first
@@ -51,30 +52,29 @@ def build(page: "Page") -> Callable[[], None]:
             suffix = choice("As", KINDS, ".pdf", lambda _: refresh())
             place = field("Save as", "", lambda _: None, hint="board.pdf")
             button = action("Save Board", save, "save-board")
-        picture = ui.element("img").classes("board-picture").props('alt="The board as it will be printed"')
+        picture = drawn(lambda: None if said.text else spec.value.strip(), lambda: _picture(spec.value.strip()))
 
     def refresh() -> None:
-        text = spec.value.strip()
         set_prop(place, "placeholder", f"board{suffix.value}")
-        if text == drawn[0]:
-            return
-        drawn[0] = text
-        try:
-            source, wrong = _preview(installed().board(text)), ""
-        except CalibError as error:
-            source, wrong = "", str(error)
-        said.set_text(wrong)
-        button.set_enabled(bool(source))
-        picture.set_visibility(bool(source))
-        picture.props["src"] = source
+        said.set_text(_wrong(spec.value.strip()))
+        button.set_enabled(not said.text)
+        picture()
 
     return refresh
+
+
+def _wrong(spec: str) -> str:
+    try:
+        installed().board(spec)
+    except CalibError as error:
+        return str(error)
+    return ""
 
 
 async def _save(session: Session, board: Board, path: Path) -> None:
     if not await may_write(path):
         return
-    write_board(board, _drawing(board), path)
+    await asyncio.to_thread(write_board, board, _drawing(board), path)
     place = shown(session.folder, path)
     session.say(f"Board saved: {place}. Print it at 100 %, and measure its bar.", "good")
     ui.download.from_url(f"/files?path={quote(place)}")
@@ -84,9 +84,11 @@ def _drawing(board: Board) -> Drawing:
     return installed().boards[board.kind].draw(board)
 
 
-def _preview(board: Board) -> str:
-    """The board as a picture in the page."""
+def _picture(spec: str) -> str:
+    """The board as it will be printed, as an element of the page."""
+    board = installed().board(spec)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "board.svg"
         write_board(board, _drawing(board), path)
-        return "data:image/svg+xml;base64," + base64.b64encode(path.read_bytes()).decode()
+        source = f"data:image/svg+xml;base64,{base64.b64encode(path.read_bytes()).decode()}"
+    return f'<img class="board-picture" alt="The board as it will be printed" src="{source}">'

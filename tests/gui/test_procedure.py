@@ -54,6 +54,8 @@ def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> 
     window.tab("Poses")
     window.until(lambda: len(window.find_all(".space g.board")) == 10 + 1)
     window.picture("8-poses")
+    rights = "return [...document.querySelectorAll('main, main *')].map((one) => one.getBoundingClientRect().right)"
+    assert max(window.browser.execute_script(rights)) <= window.browser.execute_script("return innerWidth")
     rows = window.rows("worst-images")
     assert len(rows) == 5
     worst = rows[0][0]
