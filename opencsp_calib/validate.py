@@ -113,8 +113,9 @@ def validate(calibration: Calibration, solvers: Mapping[str, Solver], *, models:
     results, left_out = all_solved(calibration, solvers)
     pairs = differences(results)
     trials, with_what = _tried(calibration, solvers, models)
-    reasons = (*_of_solvers(pairs), *left_out, *with_what, *_of_halves(trials), *_of_models(trials), *_of_board(trials))
-    return Validation(calibration, results, pairs, trials, (*reasons, *trials.left_out))
+    of_solvers = (*_of_solvers(pairs), *_stopped_short(results), *left_out)
+    of_trials = (*_of_halves(trials), *_of_models(trials), *_of_board(trials), *trials.left_out)
+    return Validation(calibration, results, pairs, trials, (*of_solvers, *with_what, *of_trials))
 
 
 def _tried(
@@ -145,6 +146,11 @@ def _of_solvers(pairs: Sequence[Pair]) -> tuple[str, ...]:
         f"{pair.a} and {pair.b} differ by up to {pair.difference.worst_px:.2g} px in the image, more than {AGREE_PX:g}"
         for pair in apart
     )
+
+
+def _stopped_short(results: Sequence[SolverResult]) -> tuple[str, ...]:
+    """What explains a difference, or makes agreement worth less."""
+    return tuple(p.message for result in results for p in result.calibration.problems if p.code == "not-converged")
 
 
 def _of_halves(trials: Trials) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from json_page import assert_as_documented
 from opencsp_calib_bundle.solver import BundleSolver
 from opencsp_calib_opencv.solver import OpenCVSolver
 
-from opencsp_calib import Calibration, Camera, Checkerboard, Observations, SolveOptions
+from opencsp_calib import Calibration, Camera, Checkerboard, Observations, Problem, SolveOptions
 from opencsp_calib.synthetic import bowed, demo_camera, observe, seed_poses
 from opencsp_calib.trials import supported, try_out
 from opencsp_calib.uncertainty import with_uncertainty
@@ -20,14 +20,15 @@ CAMERA = demo_camera()
 
 
 class Lying(BundleSolver):
-    """Its focal length is half a pixel too long."""
+    """Its focal length is half a pixel too long, as if it had stopped too early; and it says so."""
 
     name = "lying"
 
     def solve(self, observations: Observations, model: str, options: SolveOptions) -> Calibration:
         found = super().solve(observations, model, options)
         params = found.camera.params + np.r_[0.5, 0.5, np.zeros(len(found.camera.params) - 2)]
-        return replace(found, camera=replace(found.camera, params=params))
+        stopped = Problem("not-converged", "lying ended short of the least sum of squares")
+        return replace(found, camera=replace(found.camera, params=params)).with_problems(stopped)
 
 
 class Broken(BundleSolver):
@@ -152,6 +153,7 @@ def test_a_solver_that_lies_is_found_out() -> None:
         ("lying", "opencv", False),
     ]
     assert "bundle and lying differ by up to" in found.reasons[0]
+    assert "lying ended short of the least sum of squares" in found.reasons
 
 
 def test_one_solver_has_nobody_to_agree_with_and_it_is_said() -> None:

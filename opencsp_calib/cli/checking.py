@@ -139,7 +139,8 @@ def _say_validation(found: "Validation") -> None:
         (f"{pair.a} - {pair.b}", f"{pair.difference.rms_px:.2g} px", f"{pair.difference.worst_px:.2g} px")
         for pair in found.pairs
     ]
-    say_table(("difference over the image", "rms", "worst"), differences)
+    if differences:
+        say_table(("difference over the image", "rms", "worst"), differences)
     say(SENTENCES[found.verdict])
     for reason in found.reasons[:MAX_SHOWN]:
         say(f"- {reason}")
