@@ -66,6 +66,8 @@ class Window:
         self.until(lambda: not self.element("cancel").is_displayed())
         if self.browser.find_element("xpath", clear).is_enabled():
             self.press("Clear")
+            if any(map(str.isdigit, self.rms)):
+                self.press("Forget it")
         self.until(lambda: self.text_is_there("0 photographs"))
 
     def has_result(self, views: int) -> bool:

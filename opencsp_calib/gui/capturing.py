@@ -7,6 +7,7 @@ from nicegui import ui
 from nicegui.events import KeyEventArguments
 
 from opencsp_calib.errors import InputError
+from opencsp_calib.gui.asking import may_forget
 from opencsp_calib.gui.controls import Part, action, choice, field, quiet_action
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.live_capture import SHOWN_PX, LiveCapture
@@ -71,12 +72,6 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
             settings=[line.strip() for line in asked["set"].splitlines() if line.strip()],
         )
 
-    def calibrate() -> None:
-        page.session.forget_photographs()
-        page.session.selection.add(asked["folder"])
-        find_and_calibrate(page.session)
-        page.show_tab("Calibrate")
-
     def on_key(event: KeyEventArguments) -> None:
         if event.action.keydown and not event.action.repeat and event.key.space and page.tab == "Capture":
             live.order("press")
@@ -98,7 +93,7 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
             press = quiet_action("Release", lambda: live.order("press"), "capture-release-now")
             delete = quiet_action("Delete last", lambda: live.order("delete"), "capture-delete")
         keys = ui.label("The space bar releases too.").classes("hint")
-        on = action("Calibrate these", lambda: page.attempt(calibrate), "capture-calibrate")
+        on = action("Calibrate these", lambda: _calibrate(page, asked["folder"]), "capture-calibrate")
 
     def refresh() -> None:
         begin.set_visibility(not live.running)
@@ -112,6 +107,19 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
         on.set_enabled(taken and not live.running and not page.session.busy)
 
     return refresh
+
+
+async def _calibrate(page: "Page", folder: str) -> None:
+    """Go on with the photographs in a folder."""
+
+    def go_on() -> None:
+        page.session.forget_photographs()
+        page.session.selection.add(folder)
+        find_and_calibrate(page.session)
+        page.show_tab("Calibrate")
+
+    if await may_forget(page.session):
+        page.attempt(go_on)
 
 
 def _number(text: str) -> int:

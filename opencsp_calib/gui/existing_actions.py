@@ -14,7 +14,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.camera_files import CameraFile, convert, read_camera_file, write_camera_file
 from opencsp_calib.comparison import compare
 from opencsp_calib.errors import CalibError, InputError
-from opencsp_calib.gui.asking import may_write
+from opencsp_calib.gui.asking import may_forget, may_write
 from opencsp_calib.gui.controls import choice, field, offer, quiet_action
 from opencsp_calib.gui.drawn import DRAWING
 from opencsp_calib.gui.files import shown, with_ending, within
@@ -159,13 +159,17 @@ def _convert(page: "Page", chosen: Chosen) -> Refresh:
 def _solve_again(page: "Page", chosen: Chosen) -> Refresh:
     session = page.session
 
-    def run() -> None:
+    def solve_again() -> None:
         take_up(session, chosen.opened.path)
         page.show_tab("Calibrate")
 
+    async def run() -> None:
+        if await may_forget(session):
+            page.attempt(solve_again)
+
     ui.html("<h2>Solve again</h2>", sanitize=False)
     ui.label("Takes the corners kept in the file to Calibrate, to be solved in another way.").classes("hint")
-    button = quiet_action("Solve again", lambda: page.attempt(run), "solve-again")
+    button = quiet_action("Solve again", run, "solve-again")
 
     def refresh() -> None:
         button.set_enabled(chosen.file is not None and chosen.file.calibration is not None and not session.busy)

@@ -7,6 +7,8 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from opencsp_calib.errors import CalibError
+from opencsp_calib.gui.asking import may_forget
 from opencsp_calib.gui.controls import action, field
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.kept import is_kept, take_up
@@ -50,6 +52,11 @@ class PhotographInput(Element, component="photographs.js"):
 def build(page: "Page") -> Callable[[], None]:
     """See `page.py`."""
     session = page.session
+
+    async def forget() -> None:
+        if await may_forget(session):
+            session.forget_photographs()
+
     with PhotographInput(session) as entry:
         select = action("Select Images", lambda: None, "select-images")
         ui.label("or drop files or a folder here").classes("hint")
@@ -58,7 +65,7 @@ def build(page: "Page") -> Callable[[], None]:
     _folder_field(page)
     with ui.element("div").classes("with-button"):
         count = ui.label().classes("count")
-        clear = ui.button("Clear", on_click=session.forget_photographs).props("no-caps flat dense")
+        clear = ui.button("Clear", on_click=forget).props("no-caps flat dense")
 
     def refresh() -> None:
         chosen = session.selection
@@ -72,16 +79,18 @@ def build(page: "Page") -> Callable[[], None]:
 
 
 def _folder_field(page: "Page") -> None:
-    def take() -> None:
-        path = within(page.session.folder, folder.value)
-        if is_kept(path):
-            take_up(page.session, path)
-            return
-        source, found = page.session.selection.add(folder.value or ".")
-        page.session.say(f"{found} photographs in {source}.")
+    session = page.session
 
-    def use() -> None:
-        page.attempt(take)
+    async def use() -> None:
+        try:
+            path = within(session.folder, folder.value)
+            if not is_kept(path):
+                source, found = session.selection.add(folder.value or ".")
+                session.say(f"{found} photographs in {source}.")
+            elif await may_forget(session):
+                take_up(session, path)
+        except CalibError as error:
+            session.say(str(error), "bad")
 
     with ui.element("div").classes("with-button"):
         folder = field("or a folder here", "", lambda _: None, "photograph-folder", "or a file of corners")

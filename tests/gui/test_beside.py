@@ -87,6 +87,11 @@ def test_a_camera_file_is_solved_again_and_views_are_left_out(calibrated: Window
     calibrated.click("open-camera")
     calibrated.until(lambda: calibrated.enabled("solve-again"))
     calibrated.click("solve-again")
+    calibrated.press("Keep it")
+    assert calibrated.element("rms").get_attribute("textContent") == rms
+    calibrated.until(lambda: not calibrated.find_all(".q-dialog"))
+    calibrated.click("solve-again")
+    calibrated.press("Forget it")
     calibrated.until(lambda: calibrated.status.startswith("Corners of 12 views"))
     assert not calibrated.enabled("find-corners")
     calibrated.calibrate()
