@@ -91,10 +91,11 @@ class Camera:
             [right, bottom],
         ]
         rays = self.unproject(np.array(ends))
-        angles = np.arctan2(
-            np.linalg.norm(np.cross(rays[::2], rays[1::2]), axis=1), (rays[::2] * rays[1::2]).sum(axis=1)
-        )
-        return float(angles[0]), float(angles[1]), float(angles[2])
+        one, other = rays[::2], rays[1::2]
+        angles = np.arctan2(np.linalg.norm(np.cross(one, other), axis=1), (one * other).sum(axis=1))
+        behind = (one + other)[:, 2] < 0.0  # then the shorter way between them is not through the image
+        horizontal, vertical, diagonal = np.where(behind, 2.0 * np.pi - angles, angles).tolist()
+        return horizontal, vertical, diagonal
 
     def project(self, points: ArrayLike) -> Pixels:
         """Pixels of points in the camera's frame (x right, y down, z forward).

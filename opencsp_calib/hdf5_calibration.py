@@ -184,8 +184,11 @@ def _read_observations(group: "h5py.Group") -> Observations:
         except InputError as error:  # NaN, a corner twice
             raise FileFormatError(f"{group.file.filename}: view {index + 1} of {len(described)}: {error}") from None
     width, height = (int(side) for side in read_dataset(group, "image_size"))
-    board = _board_from_json(_json(group, "board"), _array(group, "board_points", (None, 3)))
-    return Observations(board, (width, height), tuple(views))
+    points = _array(group, "board_points", (None, 3))
+    try:
+        return Observations(_board_from_json(_json(group, "board"), points), (width, height), tuple(views))
+    except InputError as error:  # NaN again, or a corner that the board has not
+        raise FileFormatError(f"{group.file.filename}: {error}") from None
 
 
 def _charuco_fields(board: Board) -> dict[str, Any]:

@@ -75,6 +75,12 @@ def test_field_of_view_of_a_pinhole_is_trigonometry() -> None:
     assert camera.field_of_view[2] == pytest.approx(2 * np.arctan(np.sqrt(2)))
 
 
+def test_field_of_view_of_a_fisheye_may_be_more_than_half_of_all_around() -> None:
+    """Without distortion the angle to the axis is the distance from the principal point over the focal length."""
+    camera = Camera("f", "opencv_fisheye", [250.0, 250.0, 499.5, 399.5, 0, 0, 0, 0], (1000, 800))
+    np.testing.assert_allclose(camera.field_of_view, [1000 / 250, 800 / 250, np.hypot(1000, 800) / 250], rtol=1e-9)
+
+
 def test_undistort_puts_a_distorted_dot_where_a_pinhole_sees_it() -> None:
     camera = Camera("d", "opencv4", [300.0, 300.0, 160.0, 120.0, -0.3, 0.1, 0, 0], (320, 240))
     y, x = np.mgrid[:240, :320]

@@ -113,15 +113,23 @@ def test_a_calibration_comes_back_whole(board: Board, tmp_path: Path) -> None:
         assert (new.detection.covariance is None) == (old.detection.covariance is None or not len(old.detection))
 
 
-@pytest.mark.parametrize(("name", "value", "what"), [("pixels", np.nan, "NaN"), ("ids", 0, "same corner twice")])
-def test_corners_that_cannot_be_are_refused_by_name(name: str, value: float, what: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "value", "what"),
+    [
+        ("pixels", np.nan, r"view 1 of .*NaN"),
+        ("ids", None, r"view 1 of .*same corner twice"),
+        ("ids", 9999, "names a corner that the board"),
+        ("board_points", np.nan, "board points has"),
+    ],
+)
+def test_corners_that_cannot_be_are_refused_by_name(name: str, value: float | None, what: str, tmp_path: Path) -> None:
     """By a file that somebody else made: ours does not write such."""
     path = tmp_path / "observed.h5"
     save_observations(observations(BOARDS[0]), path)
     with h5py.File(path, "a") as file:
         dataset = file["Calibration/observations"][name]
-        dataset[0] = dataset[1] if name == "ids" else value
-    with pytest.raises(FileFormatError, match=rf"observed\.h5: view 1 of .*{what}"):
+        dataset[0] = dataset[1] if value is None else value
+    with pytest.raises(FileFormatError, match=rf"observed\.h5: .*{what}"):
         load_observations(path)
 
 
