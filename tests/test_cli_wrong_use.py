@@ -179,7 +179,9 @@ def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureF
     assert "opencv6" in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, "--model", "opencv6")
     assert "'magic'" in complaint(capsys, *base, "--solver", "magic")
     assert "bundle" in complaint(capsys, *base, "--solver", "opencv", "--board-shape", "free")
-    assert "--solver" in complaint(capsys, *base, "--preset", "opencsp", "--solver", "mrcal")
+    said = complaint(capsys, *base, "--preset", "opencsp", "--solver", "mrcal")
+    assert "means --solver opencv; leave out --solver mrcal" in said
+    assert "means --no-robust; leave out --robust" in complaint(capsys, *base, "--preset", "opencsp", "--robust")
     assert "KEY=VALUE" in complaint(capsys, *base, "--note", "f8")
     assert "free, square or a number" in complaint(capsys, *base, "--pixel-aspect", "round")
     assert "WIDTHxHEIGHT" in complaint(capsys, "show", camera_file, "--image-size", "big")

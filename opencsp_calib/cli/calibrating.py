@@ -181,9 +181,16 @@ def _preset(preset: str | None, asked: dict[str, Any]) -> dict[str, Any]:
     meant = PRESETS[preset]
     for key, value in asked.items():
         if value != meant.get(key, value):
-            flag = "--" + key.replace("_", "-")
-            raise InputError(f"--preset {preset} means {flag} {meant[key]}; leave {flag} {value} or the preset")
+            means, typed = _as_typed(key, meant[key]), _as_typed(key, value)
+            raise InputError(f"--preset {preset} means {means}; leave out {typed}, or the preset")
     return {**asked, **meant}
+
+
+def _as_typed(key: str, value: Any) -> str:
+    flag = key.replace("_", "-")
+    if isinstance(value, bool):
+        return f"--{flag}" if value else f"--no-{flag}"
+    return f"--{flag} {value}"
 
 
 def _record(notes: list[str], pixel_pitch: float | None) -> dict[str, str]:
