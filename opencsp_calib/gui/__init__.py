@@ -4,7 +4,8 @@
 
     loading.py   loads all this quickly                  server.py  starts: socket, token, address
     guard.py     who may ask at all
-    session.py   what has been chosen and found so far, kept in a folder in DIR
+    session.py   what has been chosen and found so far, kept in a folder in DIR by session_file.py
+    settings.py  what is typed and chosen                 board_text.py  the board that it describes
     offered.py   what plugins offer here
     work.py      hands long work to jobs.py, which runs in a process of its own;
     live_capture.py does so with a capture, to capture_job.py

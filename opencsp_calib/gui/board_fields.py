@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING
 from nicegui import ui
 
 from opencsp_calib.errors import InputError
+from opencsp_calib.gui.board_text import board_text
 from opencsp_calib.gui.controls import offer, set_prop
+from opencsp_calib.gui.session import Session
 from opencsp_calib.gui.setting_fields import SettingFields
-from opencsp_calib.gui.settings import BY_FIELDS, COUNTED, Settings
+from opencsp_calib.gui.settings import BY_FIELDS, COUNTED, FILE
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.registry import installed
 
@@ -20,6 +22,7 @@ __all__ = ["build"]
 DICTIONARIES = [f"DICT_{size}X{size}_{count}" for size in (4, 5, 6, 7) for count in (50, 100, 250, 1000)]
 DICTIONARIES += ["DICT_ARUCO_ORIGINAL", "DICT_APRILTAG_16h5", "DICT_APRILTAG_25h9", "DICT_APRILTAG_36h11"]
 DEFAULT = {"": "default"}
+DESCRIBED, IN_FILE = "Description of the board", "Board file, or camera file"
 
 
 def build(page: "Page") -> Callable[[], None]:
@@ -27,7 +30,7 @@ def build(page: "Page") -> Callable[[], None]:
     session, fields = page.session, SettingFields(page.session)
     with ui.element("div").classes("side-by-side right-wider"):
         fields.line("camera_name", "Camera name", "camera-name", "camera")
-        fields.option("board_kind", "Board", {name: name for name in sorted(installed().boards)})
+        fields.option("board_kind", "Board", {name: name for name in sorted(installed().boards)} | {FILE: "in a file"})
     with ui.element("div").classes("side-by-side") as grid:
         across = fields.line("grid_x", COUNTED["checkerboard"][0], "grid-x", "18")
         down = fields.line("grid_y", COUNTED["checkerboard"][1], "grid-y", "23")
@@ -37,7 +40,7 @@ def build(page: "Page") -> Callable[[], None]:
         fields.option("dictionary", "Dictionary", {name: name for name in DICTIONARIES})
         fields.tick("inverted", "White on black").props("dense")
         fields.tick("legacy", "Layout before OpenCV 4.6").props("dense")
-    described = fields.line("board_spec", "Description of the board")
+    described = fields.line("board_spec", DESCRIBED, "board-described")
     said = ui.label().classes("hint")
     with ui.element("div").classes("side-by-side"):
         solved_by = [
@@ -58,7 +61,8 @@ def build(page: "Page") -> Callable[[], None]:
         described.set_visibility(now.board_kind not in BY_FIELDS)
         for count, label in zip((across, down), COUNTED.get(now.board_kind, COUNTED["checkerboard"]), strict=True):
             set_prop(count, "label", label)
-        said.set_text(_said(now))
+        set_prop(described, "label", IN_FILE if now.board_kind == FILE else DESCRIBED)
+        said.set_text(_said(session))
         said.set_visibility(bool(said.text))
         for made in solved_by:
             made.set_enabled(not now.preset)
@@ -66,13 +70,16 @@ def build(page: "Page") -> Callable[[], None]:
     return refresh
 
 
-def _said(now: Settings) -> str:
+def _said(session: Session) -> str:
     """What is wrong with the first field that is wrong; until all of the board is typed, else, what grid points are."""
+    now = session.settings
     try:
         now.check_typed()
+        if now.board_kind == FILE:
+            board_text(now, session.folder)
     except InputError as error:
         return str(error)
-    if now.board_kind == "checkerboard" and not now.is_complete:
+    if now.board_kind == "checkerboard" and not session.board:
         return "Grid points are the inner corners, where two black squares meet."
     return ""
 

@@ -64,7 +64,7 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
             return
         await live.start(
             folder=str(folder),
-            board=page.session.settings.spec,
+            board=page.session.board,
             source=asked["source"],
             device=asked["device"] or None,
             release=asked["release"],
@@ -100,7 +100,7 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
         missing = known[asked["source"]].missing() if asked["source"] in known else "no installed plugin provides it"
         lacking.set_text(f"{asked['source']}: {missing}" if missing else "")
         lacking.set_visibility(missing is not None)
-        begin.set_enabled(page.session.settings.is_complete and missing is None)
+        begin.set_enabled(bool(page.session.board) and missing is None)
         for shown in (end, press, delete, keys):
             shown.set_visibility(live.running)
         taken = bool(live.frame and live.frame["taken"])

@@ -64,7 +64,7 @@ def _check(page: "Page", chosen: Chosen) -> Refresh:
             "check",
             camera=chosen.asked,
             images=[str(file.path) for file in session.selection.files],
-            board=session.settings.spec if session.settings.is_complete else "",
+            board=session.board,
         )
         level = LEVELS[found["verdict"]]
         reasons = "".join(f"<li>{escape(reason)}</li>" for reason in found["reasons"])

@@ -27,7 +27,7 @@ def build(page: "Page") -> Callable[[], None]:
     session = page.session
 
     async def work() -> None:
-        given = {"board": session.settings.spec} if session.settings.is_complete else {}
+        given = {"board": session.board} if session.board else {}
         given |= {"model": session.settings.model, "solver": session.settings.solver}
         results = await session.job("fleet", where=str(within(session.folder, place.value or ".")), given=given)
         found.set_content(_told(results["cameras"]))

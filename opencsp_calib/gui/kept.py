@@ -6,8 +6,9 @@ from typing import Any
 
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard
 from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.gui.described import described
 from opencsp_calib.gui.files import shown
-from opencsp_calib.gui.session import Session, described
+from opencsp_calib.gui.session import Session
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_observations
 from opencsp_calib.hdf5_reading import EXTENSIONS
 from opencsp_calib.registry import installed

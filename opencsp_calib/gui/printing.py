@@ -18,6 +18,7 @@ from opencsp_calib.gui.controls import action, choice, field, set_prop
 from opencsp_calib.gui.drawn import drawn
 from opencsp_calib.gui.files import shown, with_ending, within
 from opencsp_calib.gui.session import Session
+from opencsp_calib.gui.settings import FILE
 from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def build(page: "Page") -> Callable[[], None]:
     with ui.element("div").classes("two"):
         with ui.element("div").classes("narrow"):
             ui.html("<h2>Print a board</h2>", sanitize=False)
-            started = session.settings.spec if session.settings.is_complete else EXAMPLE
+            started = session.settings.spec if session.board and session.settings.board_kind != FILE else EXAMPLE
             spec = field("Description of the board", started, lambda _: refresh(), "board-spec")
             for kind in installed().boards.values():
                 ui.label(kind.grammar).classes("hint")

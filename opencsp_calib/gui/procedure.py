@@ -4,9 +4,10 @@ import asyncio
 from collections.abc import Iterable
 from functools import partial
 
+from opencsp_calib.gui.described import described
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.news import Level, Message
-from opencsp_calib.gui.session import Session, described
+from opencsp_calib.gui.session import Session
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations
 
 __all__ = ["calibrate", "find_and_calibrate", "find_corners", "put_back", "remove"]
@@ -51,7 +52,7 @@ async def _find_corners(session: Session) -> None:
         await session.job(
             "find_corners",
             images=[str(file.path) for file in session.selection.files],
-            board=session.settings.spec,
+            board=session.board,
             options=session.settings.finding,
             observations=str(target),
             journal=str(session.file("found", "journal")),

@@ -1,50 +1,33 @@
 """What has been chosen and found so far: one for the window, whatever pages show it, kept in a folder below DIR.
 
-::
-
-    DIR/opencsp-calib-session/
-        session.json         settings, where the photographs are, what was left out
-        photographs/         those that came by upload
-        thumbnails/
-        observations.hdf5    of the last search for corners     (our own files, see `hdf5_calibration`; named so that
-        calibration.hdf5     of the last calibration            they are not taken for camera files of the user's)
-        before.hdf5          of the one before
-        found.journal        what was found in each photograph, so that a search goes on where it was stopped
-
 Every page shows the same session and is told when it changes, so that a reload, a second tab or a lost connection lose
-nothing; nor does a restart, because all of it is on the disk.
+nothing; nor does a restart, because all of it is on the disk (`session_file.py`).
 """
 
 import asyncio
-import json
-from collections.abc import Callable, Coroutine, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from nicegui import Event
 
-from opencsp_calib.atomic import replacing
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibError, InputError
-from opencsp_calib.gui.files import shown
+from opencsp_calib.gui.board_text import board_text
 from opencsp_calib.gui.live_capture import LiveCapture
 from opencsp_calib.gui.news import Level, Message, Progress
 from opencsp_calib.gui.offered import Offered
 from opencsp_calib.gui.selection import Selection
-from opencsp_calib.gui.settings import Settings
+from opencsp_calib.gui.session_file import read_session, write_session
+from opencsp_calib.gui.settings import FILE, Settings
 from opencsp_calib.gui.thumbnails import Thumbnails
 from opencsp_calib.gui.work import Worker
-from opencsp_calib.hdf5_calibration import load_calibration, load_observations
-from opencsp_calib.initial import rough_tilts
-from opencsp_calib.summary import observations_as_json
 
-__all__ = ["FOLDER", "Session", "described"]
+__all__ = ["FOLDER", "Session"]
 
 FOLDER = "opencsp-calib-session"
-VERSION = 1
 PAUSE_S = 0.5  # between two news to the pages while work goes on: a browser draws a table at the work's cost
 
 
@@ -81,7 +64,7 @@ class Session:
         self._news: asyncio.TimerHandle | None = None
         self._writing: asyncio.TimerHandle | None = None
         self._works: set[asyncio.Task[bool]] = set()
-        self._load()
+        read_session(self)
 
     # --- what makes sense now ---
 
@@ -91,10 +74,18 @@ class Session:
         return self.progress is not None
 
     @property
+    def board(self) -> str:
+        """The board, as `pipeline.board_from` takes it; empty while the fields describe none."""
+        try:
+            return board_text(self.settings, self.folder)
+        except InputError:
+            return ""
+
+    @property
     def can_find(self) -> bool:
         """Whether there is something to look for, and photographs to look at."""
         chosen = self.selection
-        return bool(chosen.files) and not chosen.receiving and not self.busy and self.settings.is_complete
+        return bool(chosen.files) and not chosen.receiving and not self.busy and bool(self.board)
 
     @property
     def is_found(self) -> bool:
@@ -165,18 +156,8 @@ class Session:
     def keep(self) -> None:
         """Write the session file."""
         self._writing = None
-        content = {
-            "version": VERSION,
-            "settings": self.settings.as_json(),
-            "sources": self.selection.sources,
-            "kept": self.kept,
-            "found_with": self.found_with,
-            "solved_with": self.solved_with,
-            "removed": sorted(self.removed),
-        }
         try:
-            with replacing(self.file("session", "json")) as temporary:
-                temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+            write_session(self)
         except (InputError, OSError) as error:
             self.message = Message(f"This session cannot be kept: {error}", "bad")
             self.changed.emit()
@@ -190,6 +171,11 @@ class Session:
     def _tell_now(self) -> None:
         self._news = None
         self.changed.emit()
+
+    def file(self, name: str, extension: str = "hdf5") -> Path:
+        """One of the session's own files."""
+        self.own.mkdir(exist_ok=True)
+        return self.own / f"{name}.{extension}"
 
     # --- the work ---
 
@@ -246,50 +232,10 @@ class Session:
         """What decides what is found."""
         if self.kept and not self.selection.files:
             return [self.kept]
-        return [self.settings.spec, self.settings.finding, [str(file.path) for file in self.selection.files]]
+        board = self.board
+        changed = Path(board).stat().st_mtime_ns if board and self.settings.board_kind == FILE else 0
+        return [board, changed, self.settings.finding, [str(file.path) for file in self.selection.files]]
 
     def asked_to_solve(self, removed: frozenset[str]) -> list[Any]:
         """What decides what is solved for: the corners found, views left out, and what is typed and chosen."""
         return [self.found_with, sorted(removed), self.settings.as_json()]
-
-    # --- the disk ---
-
-    def file(self, name: str, extension: str = "hdf5") -> Path:
-        """One of the session's own files."""
-        self.own.mkdir(exist_ok=True)
-        return self.own / f"{name}.{extension}"
-
-    def _load(self) -> None:
-        """Go on from where it was left."""
-        path = self.own / "session.json"
-        if not path.is_file():
-            return
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-            self.settings = Settings.from_json(content["settings"])
-            self.selection.sources = tuple(str(source) for source in content["sources"])
-            self.kept = str(content.get("kept", ""))
-            self.found_with, self.solved_with = content["found_with"], content.get("solved_with", [])
-            self.removed = frozenset(str(name) for name in content["removed"])
-            wrong = self.selection.look_up()
-            with suppress(FileNotFoundError):
-                self._load_results()
-            self.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
-        except (InputError, OSError, ValueError, KeyError, TypeError) as error:
-            self.message = Message(f"The session kept in {shown(self.folder, path)} cannot be read: {error}", "bad")
-
-    def _load_results(self) -> None:
-        if self.file("observations").exists():
-            self.observations = load_observations(self.file("observations"))
-            self.views = described(self.observations)
-        if self.file("calibration").exists():
-            self.calibration = load_calibration(self.file("calibration"))
-        if self.file("before").exists():
-            self.before = load_calibration(self.file("before"))
-
-
-def described(seen: Observations | None) -> dict[str, dict[str, Any]]:
-    """What is known of each view before there is a calibration, by image."""
-    tilts = rough_tilts(seen) if seen else {}
-    found: list[Mapping[str, Any]] = observations_as_json(seen, {}, None)["views"] if seen else []
-    return {view["image"]: {**view, "tilt_deg": tilts.get(view["image"])} for view in found}

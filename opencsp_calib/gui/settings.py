@@ -13,13 +13,17 @@ from opencsp_calib.registry import installed
 from opencsp_calib.summary import PIXEL_PITCH
 from opencsp_calib.typed import aspect_from, notes_from
 
-__all__ = ["BY_FIELDS", "COUNTED", "Settings"]
+__all__ = ["BY_FIELDS", "COUNTED", "FILE", "Settings"]
 
 COUNTED = {"checkerboard": ("Grid points x", "Grid points y"), "charuco": ("Squares x", "Squares y")}
 """How the fields of a board's columns and rows are called, which count what its kind counts."""
 
 BY_FIELDS = tuple(COUNTED)
 """Kinds of board that have fields of their own; any other is described in one line."""
+
+
+FILE = "file"
+"""The kind of a board that is in a file, with its corners as measured or as solved."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +40,7 @@ class Settings:
     inverted, legacy : bool
         These four of ChArUco.
     board_spec : str
-        In one line, of any other kind.
+        In one line, of any other kind; where the file is, of `FILE`.
     model, solver, board_shape, pixel_aspect, weights, robust, guess, detector, refine, preset, notes
         As the options of ``calibrate``.
     select, drop_worst, max_rms : str
@@ -104,7 +108,7 @@ class Settings:
         for text, field, check in typed:
             if text:
                 check(text, field)
-        if all(text for text, _, _ in typed) and self.spec:
+        if all(text for text, _, _ in typed) and self.spec and self.board_kind != FILE:
             self.board()
         _ = self.solving, self.leaving_out, self.record  # each refuses what it cannot understand
 
@@ -120,15 +124,6 @@ class Settings:
             (self.square_mm, "Square size", _check_length),
             *markers,
         ]
-
-    @property
-    def is_complete(self) -> bool:
-        """Whether the fields describe a board."""
-        try:
-            self.board()
-        except InputError:
-            return False
-        return True
 
     @property
     def finding(self) -> dict[str, Any]:

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from camera_files import assert_same_files
 from gui_window import Window, run_cli
 from worlds import SmallWorld
 
-from opencsp_calib import Camera
+from opencsp_calib import Camera, Checkerboard
+from opencsp_calib.board_file import write_board_file
 from opencsp_calib.images import write_image
 from opencsp_calib.registry import installed
 
@@ -188,9 +190,11 @@ def test_print_a_board(window: Window, tmp_path: Path) -> None:
     assert (window.server.folder / "board.pdf").read_bytes() == (tmp_path / "cli.pdf").read_bytes()
 
 
-def test_a_camera_is_no_file_name(window: Window, photographs: Path) -> None:
-    """A name with a path in it stays within the folder; photographs in the folder need no upload."""
-    folder = window.server.folder
+def test_a_measured_board_and_a_camera_that_is_no_file_name(window: Window, photographs: Path, tmp_path: Path) -> None:
+    """A name with a path in it stays within the folder; photographs and the board in the folder need no upload."""
+    folder, board = window.server.folder, Checkerboard(9, 6, 0.03)
+    measured = board.points + np.random.default_rng(1).normal(0, 1e-4, board.points.shape)
+    write_board_file(board.with_points(measured), folder / "board.json")
     around = set(folder.parent.iterdir())
     (folder / "set").mkdir()
     for photograph in sorted(photographs.glob("*.png"))[:5]:
@@ -199,8 +203,15 @@ def test_a_camera_is_no_file_name(window: Window, photographs: Path) -> None:
     window.type("photograph-folder", "set")
     window.press("Use")
     window.until(lambda: window.status == "5 photographs in set.")
+    window.choose("Board", "in a file")
+    window.type("board-described", "board.json")
+    window.until(lambda: window.enabled("find-corners"))
     window.find_corners()
     window.calibrate()
     window.click("save-camera")
     window.until(lambda: window.status == "Camera saved: evil v1.2.h5")
     assert set(folder.parent.iterdir()) == around
+    by_cli = tmp_path / "cli.h5"
+    run_cli("calibrate", folder / "set", "--board", folder / "board.json", "--name", "../evil v1.2", "-o", by_cli)
+    assert_same_files(folder / "evil v1.2.h5", by_cli)
+    window.choose("Board", "checkerboard")

@@ -1,0 +1,81 @@
+"""What a session is on the disk, and how tomorrow goes on from it.
+
+::
+
+    DIR/opencsp-calib-session/
+        session.json         settings, where the photographs are, what was left out
+        photographs/         those that came by upload
+        thumbnails/
+        observations.hdf5    of the last search for corners     (our own files, see `hdf5_calibration`; named so that
+        calibration.hdf5     of the last calibration            they are not taken for camera files of the user's)
+        before.hdf5          of the one before
+        found.journal        what was found in each photograph, so that a search goes on where it was stopped
+"""
+
+import json
+from typing import TYPE_CHECKING
+
+from opencsp_calib.atomic import replacing
+from opencsp_calib.errors import InputError
+from opencsp_calib.gui.described import described
+from opencsp_calib.gui.files import shown
+from opencsp_calib.gui.news import Message
+from opencsp_calib.gui.settings import Settings
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations
+
+if TYPE_CHECKING:
+    from opencsp_calib.gui.session import Session
+
+__all__ = ["read_session", "write_session"]
+
+VERSION = 1
+
+
+def write_session(session: "Session") -> None:
+    """Write the session file.
+
+    Raises
+    ------
+    InputError, OSError
+        If it cannot be written.
+    """
+    content = {
+        "version": VERSION,
+        "settings": session.settings.as_json(),
+        "sources": session.selection.sources,
+        "kept": session.kept,
+        "found_with": session.found_with,
+        "solved_with": session.solved_with,
+        "removed": sorted(session.removed),
+    }
+    with replacing(session.file("session", "json")) as temporary:
+        temporary.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+
+def read_session(session: "Session") -> None:
+    """Go on from where it was left, if there is such a file; what is wrong with it becomes the session's message."""
+    path = session.own / "session.json"
+    if not path.is_file():
+        return
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        session.settings = Settings.from_json(content["settings"])
+        session.selection.sources = tuple(str(source) for source in content["sources"])
+        session.kept = str(content["kept"])
+        session.found_with, session.solved_with = content["found_with"], content["solved_with"]
+        session.removed = frozenset(str(name) for name in content["removed"])
+        wrong = session.selection.look_up()
+        _read_results(session)
+        session.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
+    except (InputError, OSError, ValueError, KeyError, TypeError) as error:
+        session.message = Message(f"The session kept in {shown(session.folder, path)} cannot be read: {error}", "bad")
+
+
+def _read_results(session: "Session") -> None:
+    if session.file("observations").exists():
+        session.observations = load_observations(session.file("observations"))
+        session.views = described(session.observations)
+    if session.file("calibration").exists():
+        session.calibration = load_calibration(session.file("calibration"))
+    if session.file("before").exists():
+        session.before = load_calibration(session.file("before"))
