@@ -18,6 +18,7 @@ from opencsp_calib.rotations import rotation_matrices
 
 __all__ = ["LEAST_VIEWS", "Calibration", "Solve"]
 
+ASKED = ("model", "solver", "board_shape", "pixel_aspect", "weights", "robust")
 LEAST_VIEWS = 3
 """Below these nobody calibrates: two views may do in theory, and nothing tells how wrong they are."""
 
@@ -113,6 +114,15 @@ class Calibration:
     def sigma(self) -> Params:
         """(P,) standard deviations of the parameters, the honest ones."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def repeated_by(self) -> dict[str, Any]:
+        """The options of `pipeline.solve` that repeat it, as far as it tells them; at least model and solver."""
+        told = self.provenance.get("asked")
+        if not isinstance(told, Mapping):
+            return {"model": self.camera.model, "solver": self.solver.partition(" ")[0]}
+        known = {name: told[name] for name in ASKED if name in told}  # it may come from anybody's file
+        return {name: value for name, value in known.items() if isinstance(value, str | bool | int | float | None)}
 
     def with_problems(self, *problems: Problem) -> "Calibration":
         """The same result with more to say."""

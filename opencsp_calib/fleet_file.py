@@ -16,6 +16,7 @@ photographs in it is one.
 """
 
 import difflib
+import reprlib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
@@ -212,5 +213,5 @@ def _checked(key: str, value: Any, where: str) -> Any:
         raise FileFormatError(f"{where}: there is no setting {key!r}{meant}")
     wanted, fits = SETTINGS[key]
     if not fits(value):
-        raise FileFormatError(f"{where}: {key!r} must be {wanted}, not {value!r}")
+        raise FileFormatError(f"{where}: {key!r} must be {wanted}, not {reprlib.repr(value)[:80]}")
     return value

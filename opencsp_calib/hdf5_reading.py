@@ -1,5 +1,6 @@
 """Opening an HDF5 file of anybody's, and reading its datasets: damage and foreign content become one clear sentence."""
 
+import math
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,6 +19,8 @@ __all__ = ["EXTENSIONS", "like_hdf5", "opened", "read_dataset"]
 
 EXTENSIONS = (".h5", ".hdf5", ".hdf")
 MAX_VALUES = 50_000_000  # in one dataset; more is a damaged or hostile file
+MAX_BYTES = 8 * MAX_VALUES
+MAX_CHUNK = 10_000_000  # values that are unpacked together, however few the dataset shows of them
 UNEXPECTED = (OSError, LookupError, ValueError, TypeError, RuntimeError, AttributeError, ArithmeticError)
 """What h5py and those who ask it raise over damaged or foreign content."""
 
@@ -44,8 +47,10 @@ def opened(path: str | os.PathLike[str]) -> Iterator["h5py.File"]:
     with _open(path) as file:
         try:
             yield file
-        except InputError:
-            raise
+        except InputError as error:
+            if str(path) in str(error):
+                raise
+            raise FileFormatError(f"{path}: {error}") from None
         except UNEXPECTED as error:
             raise FileFormatError(f"{path} is not a camera file, or it is damaged: {_one_line(error)}") from None
 
@@ -93,6 +98,8 @@ def read_dataset(group: "h5py.Group", name: str) -> Any:
         raise FileFormatError(f"{where} is not a dataset of this file's own")
     if dataset.size > MAX_VALUES:
         raise FileFormatError(f"{where} has {dataset.size} values, more than a camera file can need")
+    if dataset.nbytes > MAX_BYTES or math.prod(dataset.chunks or ()) > MAX_CHUNK:
+        raise FileFormatError(f"{where} takes more memory than a camera file can need")
     if h5py.check_string_dtype(dataset.dtype) is not None:
         return dataset.asstr()[()]
     value = dataset[()]

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 from opencsp_calib.camera import Camera
 from opencsp_calib.errors import InputError
@@ -54,6 +54,9 @@ class SolveOptions:
     robust: bool = False
 
     def __post_init__(self) -> None:
+        for name, words in (("board_shape", get_args(BoardShape)), ("weights", get_args(Weights))):
+            if getattr(self, name) not in words:
+                raise InputError(f"{name} is one of {', '.join(words)}, not {getattr(self, name)!r}")
         if self.pixel_aspect is not None and not (math.isfinite(self.pixel_aspect) and self.pixel_aspect > 0):
             raise InputError(f"the pixel aspect (fy/fx) must be a positive number, not {self.pixel_aspect}")
 

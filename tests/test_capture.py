@@ -142,6 +142,15 @@ def test_the_last_can_be_deleted_and_numbers_go_on(tmp_path):
     assert sorted(p.name for p in tmp_path.glob("*.json")) == ["0001.json", "0002.json", "0003.json", "capture.json"]
 
 
+def test_deleting_the_last_leaves_alone_what_is_not_of_the_capture(tmp_path):
+    (tmp_path / "z.png").write_bytes(b"somebody's")
+    folder = folder_of(tmp_path)
+    folder.add(grey(1))
+    assert folder.remove_last().name == "0001.png"
+    assert folder.remove_last() is None
+    assert (tmp_path / "z.png").exists()
+
+
 def test_what_a_killed_capture_left_is_cleared_and_another_board_refused(tmp_path):
     folder_of(tmp_path).add(grey(1))
     (tmp_path / ".writing-x.png").write_bytes(b"half")

@@ -1,5 +1,7 @@
 """The command line's main job: from photographs to a camera file and a report."""
 
+import json
+import shutil
 from pathlib import Path
 
 import h5py
@@ -82,6 +84,27 @@ def test_how_corners_are_weighed_is_asked_for_and_kept(camera_file: Path, tmp_pa
         assert run(["solve", str(camera_file), "--solver", "bundle", *asked.split(), "-o", str(out)]) == 0
         options = load_calibration(out).options
         assert (options.weights, options.robust) == (weights, robust)
+
+
+@pytest.mark.parametrize("asked", ["text", [1], {"progress": 1, "bogus": 2}, {"model": ["opencv4"]}])
+def test_a_file_that_asks_for_nonsense_is_solved_by_what_is_sane_of_it(asked, camera_file, tmp_path) -> None:
+    changed = tmp_path / "c.h5"
+    shutil.copy(camera_file, changed)
+    with h5py.File(changed, "a") as file:
+        provenance = json.loads(file["Calibration/provenance"][()])
+        del file["Calibration/provenance"]
+        file["Calibration/provenance"] = json.dumps({**provenance, "asked": asked})
+    assert run(["solve", str(changed)]) == 0
+
+
+def test_what_is_wrong_in_a_calibration_is_told_with_its_file(camera_file: Path, tmp_path: Path, capsys) -> None:
+    changed = tmp_path / "c.h5"
+    shutil.copy(camera_file, changed)
+    with h5py.File(changed, "a") as file:
+        del file["Calibration/covariance"]
+        file["Calibration/covariance"] = np.eye(3)
+    for command in ("show", "solve"):
+        assert "c.h5: covariance has shape (3, 3)" in complaint(capsys, command, changed)
 
 
 def test_how_corners_are_located_is_asked_for(photographs: Path, tmp_path: Path) -> None:

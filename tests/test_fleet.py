@@ -86,6 +86,10 @@ def test_results_elsewhere_and_settings_of_one_camera(
     assert "nowhere" in found["cameras"][1]["sentence"]
 
 
+LAUGHS = "".join(f"- &a{i} [{', '.join([f'*a{i - 1}'] * 7)}]\n" for i in range(1, 12))
+"""Seven times as much at each line: two thousand million texts, were they written out."""
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -102,6 +106,7 @@ def test_results_elsewhere_and_settings_of_one_camera(
         ("note: {a: [b]}", ":1: 'note' must be pairs"),
         ("pixel-pitch: .nan", ":1: 'pixel-pitch' must be"),
         ("? [a]\n: b", ":1: a name must be a word"),
+        ("model:\n- &a0 [x, x, x, x, x, x, x]\n" + LAUGHS, ":1: 'model' must be a text, not ["),
         ("", "is empty"),
         ("cameras: {}", "has no cameras"),
         ("a: " + "[" * 1500, "this is not YAML"),

@@ -99,6 +99,17 @@ def test_a_huge_dataset_is_not_read(foreign: Path) -> None:
         Camera.load(foreign)
 
 
+@pytest.mark.parametrize(
+    ("kind", "options"), [("f8", {"chunks": (4000, 4000), "maxshape": (None, None)}), ("S500000000", {})]
+)
+def test_a_small_dataset_that_takes_much_memory_is_not_read(kind: str, options: dict, foreign: Path) -> None:
+    with h5py.File(foreign, "a") as file:
+        del file["Camera/intrinsic_mat"]
+        file.create_dataset("Camera/intrinsic_mat", (3, 3), kind, **options)
+    with pytest.raises(FileFormatError, match="intrinsic_mat takes more memory than a camera file can need"):
+        Camera.load(foreign)
+
+
 def test_no_file_and_not_hdf5(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="no such file"):
         Camera.load(tmp_path / "none.h5")

@@ -142,6 +142,8 @@ def test_dropping(seen: Observations) -> None:
         ({"solver": "none"}, "installed are"),
         ({"model": "opencv9"}, "no lens model"),
         ({"pixel_aspect": -1.0}, "positive"),
+        ({"weights": "covariances"}, "weights is one of equal, covariance, not 'covariances'"),
+        ({"board_shape": "bent"}, "board_shape is one of flat, warp, free, not 'bent'"),
         ({"pixel_aspect": float("nan")}, "positive"),
     ],
 )

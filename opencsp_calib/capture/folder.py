@@ -95,10 +95,14 @@ class CaptureFolder:
         return path
 
     def remove_last(self) -> Path | None:
-        """Delete the last photograph; gives its path, or None where there is none."""
-        if not self.images:
+        """Delete the last photograph; gives its path, or None where there is none.
+
+        An image that somebody else put into the folder is not a photograph of this capture, and stays.
+        """
+        numbered = [path for path in self.images if path.stem.isdecimal()]
+        if not numbered:
             return None
-        path = self.images[-1]
+        path = max(numbered, key=lambda one: int(one.stem))
         try:
             path.with_suffix(".json").unlink(missing_ok=True)
             path.unlink()

@@ -152,9 +152,8 @@ def _as_before(file: Path) -> dict[str, Any]:
         if "Camera" not in content:
             return {}
     before = load_calibration(file)
-    asked = before.provenance.get("asked") or {"model": before.camera.model, "solver": before.solver.split()[0]}
     return {
-        **asked,
+        **before.repeated_by,
         "guess": before.options.guess,
         "name": before.camera.name,
         "record": before.record,

@@ -70,7 +70,13 @@ def _as_before(path: Path) -> dict[str, Any]:
         before = load_calibration(path)
     except CalibError:
         return {}
-    asked = before.provenance.get("asked") or {"model": before.camera.model, "solver": before.solver.split()[0]}
-    robust = {True: "yes", False: "no", None: ""}[asked.get("robust")]
+    asked = before.repeated_by
+    robust = asked.get("robust")
     texts = {key: str(asked[key]) for key in OF_SOLVING if asked.get(key) is not None}
-    return {"camera_name": before.camera.name, "preset": "", "weights": "", **texts, "robust": robust}
+    return {
+        "camera_name": before.camera.name,
+        "preset": "",
+        "weights": "",
+        **texts,
+        "robust": "" if robust is None else "yes" if robust else "no",
+    }

@@ -22,7 +22,7 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, matrix, numbers
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
 from opencsp_calib_formats.opencv_keys import fisheye_of, image_size_of, is_image_size, named_pairs
-from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, xml_comments
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, printable, xml_comments
 from opencsp_calib_formats.safe_text import head, parse_json, parse_xml, read_bytes, read_text, set_once
 from opencsp_calib_formats.safe_yaml import parse_yaml
 
@@ -100,7 +100,8 @@ def _of_element(element: Element) -> Any:
     """A FileStorage node of XML, as of YAML: a text, a list of ``_``, or a dictionary."""
     children = list(element)
     if not children:
-        return (element.text or "").strip().strip('"')
+        text = (element.text or "").strip()
+        return text[1:-1] if len(text) > 1 and text[0] == text[-1] == '"' else text
     if all(child.tag == "_" for child in children):
         return [_of_element(child) for child in children]
     values: dict[str, Any] = {}
@@ -181,7 +182,8 @@ def _as_yaml(entries: dict[str, Any], notes: Mapping[str, str]) -> str:
     lines = ["%YAML:1.0", "---", *comments(notes)]
     for key, value in entries.items():
         if isinstance(value, int | str):
-            lines.append(f"{key}: {json.dumps(value, ensure_ascii=False)}")
+            shown = json.dumps(printable(value), ensure_ascii=False) if isinstance(value, str) else str(value)
+            lines.append(f"{key}: {shown}")
         else:
             rows, columns, data = _parts(value)
             lines += [f"{key}: !!opencv-matrix", f"   rows: {rows}", f"   cols: {columns}", "   dt: d"]
@@ -193,7 +195,7 @@ def _as_xml(entries: dict[str, Any], notes: Mapping[str, str]) -> str:
     lines = ['<?xml version="1.0"?>', "<opencv_storage>", *xml_comments(notes)]
     for key, value in entries.items():
         if isinstance(value, int | str):
-            text = str(value) if isinstance(value, int) else escape(f'"{value}"', {'"': "&quot;"})
+            text = str(value) if isinstance(value, int) else escape(f'"{printable(value)}"', {'"': "&quot;"})
             lines.append(f"<{key}>{text}</{key}>")
         else:
             rows, columns, data = _parts(value)

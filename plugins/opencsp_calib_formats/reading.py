@@ -1,5 +1,6 @@
 """What all formats of this plugin share: nothing to install, and errors that name the file."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -10,8 +11,10 @@ from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.interfaces import Imported
 
-__all__ = ["FileFormat", "TextFormat", "comments", "decimal", "naming", "not_a_result", "only_one", "unverified"]
-__all__ += ["xml_comments"]
+__all__ = ["FileFormat", "TextFormat", "comments", "decimal", "naming", "not_a_result", "only_one"]
+__all__ += ["printable", "unverified", "xml_comments"]
+
+UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]")
 
 
 class FileFormat(ABC):
@@ -60,13 +63,18 @@ class TextFormat(FileFormat):
         """See `KeepsNotes.write_with_notes`."""
         text = self.text(cameras, path, notes)
         with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8", errors="backslashreplace")
+            temporary.write_text(text, encoding="utf-8", errors="replace")  # half a character, of a file's name
 
 
 def comments(notes: Mapping[str, str]) -> list[str]:
     """Notes as the lines of a comment, of plain characters, as in YAML, ini and Python."""
     lines = (" ".join(f"# {subject}: {note}".split()) for subject, note in notes.items())
-    return [line.encode("ascii", "backslashreplace").decode("ascii") for line in lines]
+    return [printable(line).encode("ascii", "backslashreplace").decode("ascii") for line in lines]
+
+
+def printable(text: str) -> str:
+    """A text without control characters, which YAML and XML do not hold: each as Python writes it."""
+    return UNPRINTABLE.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
 
 
 def xml_comments(notes: Mapping[str, str]) -> list[str]:

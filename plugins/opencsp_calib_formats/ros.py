@@ -24,7 +24,7 @@ from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.fields import Fields, matrix, numbers, whole
 from opencsp_calib_formats.opencv_camera import carried, either_model, opencv_camera
 from opencsp_calib_formats.opencv_filestorage import is_ros
-from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one, unverified
+from opencsp_calib_formats.reading import TextFormat, comments, decimal, naming, only_one, printable, unverified
 from opencsp_calib_formats.safe_text import head, read_text
 from opencsp_calib_formats.safe_yaml import parse_yaml
 
@@ -70,7 +70,7 @@ class RosCameraInfo(TextFormat):
         width, height = camera.image_size
         lines = [*comments(notes), f"image_width: {width}", f"image_height: {height}"]
         lines += [
-            f"camera_name: {json.dumps(camera.name, ensure_ascii=False)}",
+            f"camera_name: {json.dumps(printable(camera.name), ensure_ascii=False)}",
             *_matrix("camera_matrix", camera.matrix),
         ]
         lines += [f"distortion_model: {KIND[model]}", *_matrix("distortion_coefficients", coefficients[None])]

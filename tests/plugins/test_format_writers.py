@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opencsp_calib import Camera
+from opencsp_calib import Camera, InputError
+from opencsp_calib.camera_files import write_camera_file
 from opencsp_calib.importing import exact
 from opencsp_calib.models import LENS_MODELS
 from opencsp_calib.registry import installed
@@ -39,6 +40,25 @@ def test_written_and_read_again(tmp_path: Path, name: str, model: str, f, aspect
     scale = np.ones(len(read))
     scale[:4] = [*camera.params[:2], *np.maximum(np.abs(centre), size)]
     assert (np.abs(read - written) <= 1e-12 * scale).all()
+
+
+@pytest.mark.parametrize("name", sorted({name for name, _ in WRITERS}))
+def test_any_name_and_notes_can_be_read_again(name: str, tmp_path: Path) -> None:
+    """Names come from folders and other programs' files."""
+    format_ = installed().camera_formats[name]
+    for called in ('"quoted"', 'a "b"', "it's", "a\nb", "\x01\x7f\x9f", "\ud800", "<&>--]]>", "# a: b", "%YAML", "1 5"):
+        camera = Camera(called, "opencv4", np.array([500.0, 501, 320, 240, -0.1, 0.2, 1e-4, -1e-4]), (640, 480))
+        for extension in format_.extensions:
+            path = tmp_path / f"camera{extension}"
+            if name == "ros-ini":
+                with pytest.raises(InputError, match="rename the camera"):
+                    write_camera_file(camera, path, name)
+                continue
+            write_camera_file(camera, path, name, {"lens": called, called: "x"})
+            cameras = format_.read(path).values()
+            assert camera.params.tolist() in [exact(one).params[:8].tolist() for one in cameras if one.image_size]
+            if name == "opencv" and called.isprintable():
+                assert {exact(one).name for one in cameras} == {called}
 
 
 @pytest.mark.parametrize("name", ["metashape", "opensfm", "transforms_json"])
