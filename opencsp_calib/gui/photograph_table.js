@@ -24,8 +24,9 @@ export default {
                 <img v-if="row.picture" class="thumbnail" loading="lazy" :src="row.picture" alt="" />
                 <div v-else class="thumbnail"></div>
               </template>
-              <a v-else-if="column.name === 'image'" class="name" href="#" role="button"
-                @click.stop.prevent="$emit('look', row.image)">{{ row.image }}</a>
+              <button v-else-if="column.name === 'image'" type="button" class="name" @click.stop="$emit('look', row.image)">{{
+                row.image
+              }}</button>
               <template v-else>{{ row[column.name] }}</template>
             </td>
           </tr>
