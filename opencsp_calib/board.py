@@ -50,7 +50,9 @@ class Board:
     def __post_init__(self) -> None:
         columns, rows = self.grid
         if min(columns, rows) < 1 or columns * rows > MAX_CORNERS:
-            raise BoardSpecError(f"a {self.kind} of {self.columns}x{self.rows} cannot be used as a board")
+            raise BoardSpecError(
+                f"a {self.kind} of {self.columns}x{self.rows} cannot be used: boards have 1 to {MAX_CORNERS} corners"
+            )
         if not (math.isfinite(self.spacing_m) and self.spacing_m > 0):
             raise BoardSpecError(f"the spacing of a board's corners must be positive, not {self.spacing_m} m")
         points = self.nominal_points if self.points is None else self.points

@@ -112,7 +112,7 @@ class _Place:
 
     estimate: Estimate
     equations: NormalEquations
-    step: "_Step"
+    step: _Step
     combined: Matrix
 
     @property
