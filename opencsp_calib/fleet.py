@@ -151,9 +151,10 @@ def _solved(camera: FleetCamera, **how: Any) -> Calibration:
     images = [str(camera.root / pattern) for pattern in camera.images]
     board = pipeline.board_from(_below(camera.root, settings["board"]))
     finding = {key: settings[key] for key in OF_DETECTION if key in settings}
+    options = {key.replace("-", "_"): settings[key] for key in OF_SOLVING if key in settings}
+    pipeline.check_solving(**options)
     observations = pipeline.detect(images, board, **finding, **how)
     observations = dropping.excluding(observations, settings.get("exclude", ()))
-    options = {key.replace("-", "_"): settings[key] for key in OF_SOLVING if key in settings}
     options |= {"name": camera.name, "record": _record(settings), "provenance": pipeline.places_of(images)}
     if "select" in settings:
         observations = pipeline.select(observations, settings["select"], **options).observations

@@ -37,6 +37,7 @@ __all__ = [
     "PixelAspect",
     "board_from",
     "calibrate",
+    "check_solving",
     "detect",
     "places_of",
     "select",
@@ -45,6 +46,7 @@ __all__ = [
 
 DEFAULT_MODEL = "opencv4"
 DEFAULT_SOLVER = "bundle"
+OF_ENGINE = ("board_shape", "pixel_aspect", "weights", "robust", "guess")
 OF_DETECT = ("detector", "refine", "jobs", "progress", "stop", "journal", "scheduler")
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -173,17 +175,8 @@ def solve(
     CalibrationFailedError
         If no result can be trusted.
     """
-    engine = installed().solver(solver)
+    engine, options = _asked(model, solver, board_shape, pixel_aspect, weights, robust, guess)
     _check_views(observations)
-    careful = solver == DEFAULT_SOLVER
-    options = SolveOptions(
-        guess=guess,
-        board_shape="flat" if board_shape == "auto" else board_shape,
-        pixel_aspect=_held_aspect(pixel_aspect),
-        weights=weights or ("covariance" if careful else "equal"),
-        robust=careful if robust is None else robust,
-    )
-    check_abilities(engine, model, options)
 
     def run(views: Observations, chosen: SolveOptions) -> Calibration:
         return engine.solve(views, model, chosen)
@@ -247,6 +240,7 @@ def calibrate(
     of_detect = {key: options.pop(key) for key in OF_DETECT if key in options}
     options.setdefault("provenance", places_of(images))
     count = options.pop("select", None)
+    check_solving(model, solver, **options)
     observations = detect(images, board, **of_detect)
     if count:
         observations = select(observations, count, model=model, solver=solver, **options).observations
@@ -256,6 +250,40 @@ def calibrate(
 def places_of(images: Images) -> dict[str, Any]:
     """Where images are, to be kept as provenance: a report shows them again from there."""
     return {"images": {file.name: str(file.path.absolute()) for file in find_images(images)}}
+
+
+def check_solving(model: str = DEFAULT_MODEL, solver: str = DEFAULT_SOLVER, **options: Any) -> None:
+    """Refuse what no solution can come of, before any image is looked at; `options` as for `solve`.
+
+    Raises
+    ------
+    InputError
+        If there is no such lens model or solver, or the solver is not able to do what is asked.
+    """
+    _asked(model, solver, **{key: options[key] for key in OF_ENGINE if key in options})
+
+
+def _asked(
+    model: str,
+    solver: str,
+    board_shape: BoardShape | Literal["auto"] = "auto",
+    pixel_aspect: PixelAspect | None = None,
+    weights: Weights | None = None,
+    robust: bool | None = None,
+    guess: Camera | None = None,
+) -> tuple[Solver, SolveOptions]:
+    """The solver, and what it is asked with the defaults filled in; refused where it is not able."""
+    engine = installed().solver(solver)
+    careful = solver == DEFAULT_SOLVER
+    options = SolveOptions(
+        guess=guess,
+        board_shape="flat" if board_shape == "auto" else board_shape,
+        pixel_aspect=_held_aspect(pixel_aspect),
+        weights=weights or ("covariance" if careful else "equal"),
+        robust=careful if robust is None else robust,
+    )
+    check_abilities(engine, model, options)
+    return engine, options
 
 
 def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:

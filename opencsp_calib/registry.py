@@ -64,7 +64,7 @@ class Registry:
             grammars = " or ".join(board.grammar for board in self.boards.values())
             raise BoardSpecError(
                 f"{spec!r} does not describe a board; write {grammars}, such as checkerboard:18x23:50mm, or the name "
-                "of a board file"
+                "of a board file (.json) or camera file (.h5)"
             )
         return self.boards[kind].parse(spec)
 

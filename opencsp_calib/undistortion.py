@@ -69,7 +69,6 @@ def undistort_images(
         raise InputError(f"{folder} holds the photographs themselves; give another folder")
     targets = _targets(files, folder)
     places = _places(camera, _pinhole(camera))
-    folder.mkdir(parents=True, exist_ok=True)
     for done, (target, file) in enumerate(targets.items(), start=1):
         pixels = read_image(file).pixels
         try:

@@ -13,8 +13,9 @@ import pytest
 from command_line import QUICK, answer, complaint
 from worlds import SmallWorld
 
+from opencsp_calib import pipeline
 from opencsp_calib.cli import run
-from opencsp_calib.hdf5_calibration import load_observations, save_observations
+from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_observations
 from opencsp_calib.images import write_image
 
 
@@ -69,6 +70,7 @@ def test_one_bad_image_is_listed_and_does_not_stop_the_run(
         ("charuco:4x5:54mm:40mm:DICT_NONE", "DICT_4X4_50"),
         ("dots:4x5:3mm", "write checkerboard:COLUMNSxROWS:SIZE or charuco:"),
         ("missing.json", "missing.json cannot be read: No such file"),
+        ("board.yaml", "the name of a board file (.json)"),
     ],
 )
 def test_a_wrong_board_says_how_it_is_written(spec: str, words: str, photographs: Path, capsys) -> None:
@@ -171,6 +173,24 @@ def test_foreign_and_damaged_files_say_what_they_are(
                 assert re.search(f"{name}:? ({words})", complaint(capsys, *command)), command
 
 
+def test_a_result_does_not_take_the_place_of_what_it_is_made_from(camera_file: Path, capsys) -> None:
+    for command in (["convert", camera_file, camera_file], ["solve", camera_file, "-o", camera_file]):
+        assert "is itself what is read" in complaint(capsys, *command)
+    assert load_calibration(camera_file)
+
+
+def test_what_no_solution_can_come_of_is_said_before_any_image_is_looked_at(monkeypatch, photographs, capsys) -> None:
+    monkeypatch.setattr(pipeline, "detect", None)
+    for wrong in (["--model", "opencv6"], ["--solver", "magic"], ["--pixel-aspect", "-1"]):
+        assert wrong[1] in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, *wrong)
+
+
+def test_undistorting_nothing_leaves_no_folder(camera_file: Path, tmp_path: Path, capsys) -> None:
+    write_image(np.full((48, 64), 60, np.uint8), tmp_path / "small.png")
+    complaint(capsys, "undistort", camera_file, tmp_path / "small.png", "-o", tmp_path / "new")
+    assert not (tmp_path / "new").exists()
+
+
 def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     base = ("calibrate", photographs, "--board", SmallWorld.spec)
     without_board = complaint(capsys, "calibrate", photographs)
@@ -184,6 +204,12 @@ def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureF
     assert "means --no-robust; leave out --robust" in complaint(capsys, *base, "--preset", "opencsp", "--robust")
     assert "KEY=VALUE" in complaint(capsys, *base, "--note", "f8")
     assert "free, square or a number" in complaint(capsys, *base, "--pixel-aspect", "round")
+    assert "no such file" in complaint(capsys, "validate", "none")
+    assert "leave out --board" in complaint(capsys, "validate", camera_file, "--board", SmallWorld.spec)
+    assert "installed are: bundle" in complaint(capsys, "validate", camera_file, "--solvers", ",")
+    assert "with --params only OUT" in complaint(capsys, "convert", "--params", "fx=1")
+    assert "--fit" in complaint(capsys, "convert", camera_file, "x.h5", "--model", "opencv5")
+    assert complaint(capsys, *base, "--guess", "none.h5").endswith("none.h5 does not exist")
     assert "WIDTHxHEIGHT" in complaint(capsys, "show", camera_file, "--image-size", "big")
     assert "'nonsense'" in complaint(capsys, "nonsense")
     assert ".png, .svg or .pdf" in complaint(capsys, "compare", camera_file, camera_file, "--plot", "x.gif")

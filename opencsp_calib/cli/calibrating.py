@@ -60,8 +60,9 @@ def calibrate(
     finding = {key: options.pop(key) for key in ("detector", "refine") if key in options}
     started = time.perf_counter()
     target = pipeline.board_from(board)
+    pipeline.check_solving(**options)
     files = find_images(images)
-    check_not_input(files, output, report)
+    check_not_input((file.path for file in files), output, report)
     record = _record(note or [], pixel_pitch)
     options |= {
         "name": name or as_text(files[0].path.absolute().parent.name),
@@ -133,6 +134,7 @@ def solve(
     from opencsp_calib.hdf5_calibration import load_observations
 
     check_targets(output, report)
+    check_not_input([file], output)
     observations = load_observations(file)
     started = time.perf_counter()
     result = pipeline.solve(observations, **{"name": file.stem, **_as_before(file), **solving})

@@ -87,7 +87,10 @@ def _chosen(names: str | None) -> "dict[str, Solver]":
 
     registry = installed()
     if names is not None:
-        return {name: registry.solver(name) for name in (part.strip() for part in names.split(",")) if name}
+        chosen = [name for name in (part.strip() for part in names.split(",")) if name]
+        if not chosen:
+            raise InputError(f"--solvers {names!r} names none; installed are: {', '.join(sorted(registry.solvers))}")
+        return {name: registry.solver(name) for name in chosen}
     return {name: solver for name, solver in sorted(registry.solvers.items()) if solver.missing() is None}
 
 
@@ -96,7 +99,7 @@ def _calibration(images: list[str], board: str | None, jobs: int | None) -> "Cal
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_calibration
 
-    if _is_file(images):
+    if _is_file(images) and not board:
         try:
             return load_calibration(images[0])
         except FileFormatError:  # observations only, or damaged: then the next line says so
@@ -112,10 +115,14 @@ def _observed(images: list[str], spec: str | None, jobs: int | None, usual: "Boa
     """
     from opencsp_calib import pipeline
     from opencsp_calib.hdf5_calibration import load_observations
+    from opencsp_calib.images import find_images
 
+    if spec and _is_file(images):
+        raise InputError(f"{images[0]} says which board it is of; leave out --board")
     if _is_file(images):
         return load_observations(images[0])
     board = pipeline.board_from(spec) if spec else usual
+    find_images(images)  # whether they are there, before anything is asked for
     if board is None:
         raise InputError("photographs need --board SPEC, such as --board checkerboard:18x23:50mm")
     return detected_aloud(images, board, jobs=jobs)

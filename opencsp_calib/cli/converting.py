@@ -8,6 +8,7 @@ import typer
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.camera_files import CameraName, FromFormat, ImageSize
 from opencsp_calib.cli.console import print_json, say, say_problems, say_table
+from opencsp_calib.cli.targets import check_not_input
 from opencsp_calib.errors import InputError
 
 Fit = Annotated[
@@ -19,7 +20,9 @@ AcceptError = Annotated[
 
 
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="The camera file; left out with --params.")],
+    source: Annotated[
+        Path | None, typer.Argument(metavar="IN", help="The camera file; left out with --params.")
+    ] = None,
     target: Annotated[Path | None, typer.Argument(metavar="OUT", help="The camera file to write.")] = None,
     from_format: FromFormat = None,
     to_format: Annotated[str | None, typer.Option("--to", metavar="F", help="The format to write.")] = None,
@@ -40,14 +43,18 @@ def convert(
     from opencsp_calib.summary import camera_as_json
     from opencsp_calib.typed import camera_from
 
-    out = Path(source) if params is not None and target is None else target
-    if out is None or (params is not None and target is not None):
+    typed_by_hand = params is not None
+    out = source if typed_by_hand else target
+    if source is None or out is None or (typed_by_hand and target is not None):
         raise InputError("convert takes IN and OUT, or with --params only OUT")
+    if model is not None and not typed_by_hand:
+        raise InputError("--model belongs to --params; another lens model for a camera file is asked for with --fit")
     check_writable(out)
     if params is not None:
         typed = camera_from(params, model, image_size, name or out.stem)
         converted = camera_files.Converted(typed, {})
     else:
+        check_not_input([source], out)
         opened = camera_files.read_camera_file(source, camera, from_format, image_size)
         say_problems(opened.imported.notes)
         converted = camera_files.convert(opened, fit, accept_error, name)

@@ -110,7 +110,7 @@ def _guess(path: Path | None) -> "Camera | None":
         return None
     try:
         return camera_in(path)
-    except (FileFormatError, MissingDependencyError):
-        raise
     except InputError as error:
-        raise InputError(f"--guess {path}: {error} (with `opencsp-calib convert`, and guess with its output)") from None
+        if not path.is_file() or isinstance(error, FileFormatError | MissingDependencyError):
+            raise
+        raise InputError(f"{error}; `opencsp-calib convert` takes these options: start from what it writes") from None

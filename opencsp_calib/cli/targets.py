@@ -1,12 +1,9 @@
 """Where a command's results are to go: asked before any work is done."""
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from opencsp_calib.errors import InputError
-
-if TYPE_CHECKING:
-    from opencsp_calib.images import ImageFile
 
 __all__ = ["check_not_input", "check_targets"]
 
@@ -40,9 +37,9 @@ def _named_otherwise(output: Path) -> str:
     return f"{output} would be HDF5 under {named}: let its name end in .h5{hint}"
 
 
-def check_not_input(files: "tuple[ImageFile, ...]", *targets: Path | None) -> None:
-    """No result may take the place of a photograph."""
-    photographs = {file.path.resolve() for file in files}
+def check_not_input(inputs: Iterable[Path], *targets: Path | None) -> None:
+    """No result may take the place of what it is made from."""
+    read = {path.resolve() for path in inputs}
     for target in targets:
-        if target is not None and target.resolve() in photographs:
-            raise InputError(f"{target} is one of the photographs; give another name for the result")
+        if target is not None and target.resolve() in read:
+            raise InputError(f"{target} is itself what is read; give another name for the result")
