@@ -139,6 +139,8 @@ def test_keys_release_delete_and_stop(small_world, tmp_path):
     ("options", "message"),
     [
         (["--release", "often"], "--release takes"),
+        (["--goal", "0"], "'--goal'"),
+        (["--range", "-1"], "'--range'"),
         (["--set", "ExposureTime"], "--set takes FEATURE=VALUE"),
         (["--source", "nikon"], "no image source is called 'nikon'"),
         (["--device", "nowhere"], "there is no folder 'nowhere'"),

@@ -5,6 +5,8 @@ import os
 import re
 import shutil
 import stat
+import subprocess
+import sys
 from pathlib import Path
 
 import h5py
@@ -210,6 +212,8 @@ def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureF
     assert "with --params only OUT" in complaint(capsys, "convert", "--params", "fx=1")
     assert "--fit" in complaint(capsys, "convert", camera_file, "x.h5", "--model", "opencv5")
     assert complaint(capsys, *base, "--guess", "none.h5").endswith("none.h5 does not exist")
+    assert "text was expected" in complaint(capsys, "show", camera_file, "--from", "kalibr")
+    assert "'--views'" in complaint(capsys, "demo", "--views", 2)
     assert "WIDTHxHEIGHT" in complaint(capsys, "show", camera_file, "--image-size", "big")
     assert "'nonsense'" in complaint(capsys, "nonsense")
     assert ".png, .svg or .pdf" in complaint(capsys, "compare", camera_file, camera_file, "--plot", "x.gif")
@@ -221,6 +225,13 @@ def test_nothing_is_written_when_it_fails(photographs: Path, tmp_path: Path, cap
     complaint(capsys, "calibrate", photographs, "--board", "checkerboard:5x4:30mm", "-o", out)
     assert out.read_text() == "precious"
     assert [path.name for path in tmp_path.iterdir()] == ["c.h5"]
+
+
+def test_an_interruption_while_it_loads_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt")
+    started = [sys.executable, "-m", "opencsp_calib", "formats"]
+    ended = subprocess.run(started, env=os.environ | {"PYTHONPATH": str(tmp_path)}, capture_output=True, text=True)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (1, "", "error: stopped; nothing was begun\n")
 
 
 def test_an_interruption_that_a_library_turned_into_an_error_is_one_line(monkeypatch, capsys) -> None:

@@ -137,7 +137,7 @@ def test_a_guess_that_has_to_be_chosen_says_how(tmp_path: Path, capsys: pytest.C
     cv2.imwrite(str(photograph), np.zeros((800, 1000), np.uint8))
     command("calibrate", photograph, "--board", "checkerboard:5x6:50mm", "--guess", chain, code=2)
     said = capsys.readouterr().err
-    assert "cam0, cam1 (with `opencsp-calib convert`" in " ".join(said.split())
+    assert "cam0, cam1; `opencsp-calib convert` takes these options" in " ".join(said.split())
 
 
 def test_formats_say_what_is_exact_and_what_is_fitted(capsys: pytest.CaptureFixture[str]) -> None:

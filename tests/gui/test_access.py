@@ -2,11 +2,15 @@
 
 import http.client
 import socket
+import subprocess
+import sys
 from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from gui_window import Server, Window
+
+GUI = [sys.executable, "-m", "opencsp_calib", "gui"]
 
 pytestmark = pytest.mark.timeout(1200)
 
@@ -76,16 +80,31 @@ def test_nothing_is_asked_of_another_machine(small: Window) -> None:
     assert not [entry for entry in small.browser.get_log("browser") if entry["level"] == "SEVERE"]
 
 
+def free_port() -> int:
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        return listener.getsockname()[1]
+
+
 def test_wider_open_it_says_what_that_means(tmp_path: Path) -> None:
     """Other machines need the token as well, and a page of another name is refused as ever."""
     everywhere = "0.0.0.0"  # noqa: S104
-    with Server(tmp_path, "--host", everywhere) as server:
-        token, port = urlsplit(server.address).query, urlsplit(server.address).port
+    opened = tmp_path / "opened"  # by what stands in for a browser: the last of --no-browser and --browser counts
+    asked = ("--host", everywhere, "--port", str(port := free_port()), "--browser")
+    with Server(tmp_path, *asked, BROWSER=f"sh -c 'echo %s > {opened}'") as server:
+        token = urlsplit(server.address).query
+        assert urlsplit(server.address).port == port
+        busy = subprocess.run(
+            [*GUI, str(tmp_path), "--no-browser", "--port", str(port)], capture_output=True, text=True
+        )
+        assert busy.returncode == 2
+        assert "take another --port" in busy.stderr
         assert urlsplit(server.address).hostname == socket.gethostname().lower()
         assert answer(server, f"/?{token}", address="127.0.0.2") == 200
         assert answer(server, "/", address="127.0.0.2") == 403
         assert answer(server, f"/?{token}", address="127.0.0.2", Host=f"evil.example:{port}") == 403
         assert answer(server, f"/?{token}", address="127.0.0.2", Origin="http://evil.example") == 403
+    assert opened.read_text().strip() == server.address
     assert server.more_output == ""
     for words in ("listening on 0.0.0.0", str(tmp_path.resolve()), "nothing on the way is encrypted", "ssh -L"):
         assert words in " ".join(server.errors.split())
