@@ -10,6 +10,7 @@ import numpy as np
 
 from opencsp_calib import board_shape as shapes
 from opencsp_calib import hdf5_reading, selecting
+from opencsp_calib.asking import DEFAULT_MODEL, DEFAULT_SOLVER, asked, check_solving
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.board_file import read_board_file
@@ -21,10 +22,9 @@ from opencsp_calib.detection import Observations
 from opencsp_calib.errors import InputError
 from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
-from opencsp_calib.interfaces import Detector, Solver
+from opencsp_calib.interfaces import Detector
 from opencsp_calib.journal import Journal
 from opencsp_calib.looking import Refine, Search
-from opencsp_calib.models import lens_model
 from opencsp_calib.options import BoardShape, PixelAspect, SolveOptions, Weights
 from opencsp_calib.provenance import made_with
 from opencsp_calib.registry import installed
@@ -44,9 +44,6 @@ __all__ = [
     "solve",
 ]
 
-DEFAULT_MODEL = "opencv4"
-DEFAULT_SOLVER = "bundle"
-OF_ENGINE = ("board_shape", "pixel_aspect", "weights", "robust", "guess")
 OF_DETECT = ("detector", "refine", "jobs", "progress", "stop", "journal", "scheduler")
 
 Images: TypeAlias = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
@@ -175,7 +172,7 @@ def solve(
     CalibrationFailedError
         If no result can be trusted.
     """
-    engine, options = _asked(model, solver, board_shape, pixel_aspect, weights, robust, guess)
+    engine, options = asked(model, solver, board_shape, pixel_aspect, weights, robust, guess)
     _check_views(observations)
 
     def run(views: Observations, chosen: SolveOptions) -> Calibration:
@@ -252,57 +249,6 @@ def places_of(images: Images) -> dict[str, Any]:
     return {"images": {file.name: str(file.path.absolute()) for file in find_images(images)}}
 
 
-def check_solving(model: str = DEFAULT_MODEL, solver: str = DEFAULT_SOLVER, **options: Any) -> None:
-    """Refuse what no solution can come of, before any image is looked at; `options` as for `solve`.
-
-    Raises
-    ------
-    InputError
-        If there is no such lens model or solver, or the solver is not able to do what is asked.
-    """
-    _asked(model, solver, **{key: options[key] for key in OF_ENGINE if key in options})
-
-
-def _asked(
-    model: str,
-    solver: str,
-    board_shape: BoardShape | Literal["auto"] = "auto",
-    pixel_aspect: PixelAspect | None = None,
-    weights: Weights | None = None,
-    robust: bool | None = None,
-    guess: Camera | None = None,
-) -> tuple[Solver, SolveOptions]:
-    """The solver, and what it is asked with the defaults filled in; refused where it is not able."""
-    engine = installed().solver(solver)
-    careful = solver == DEFAULT_SOLVER
-    options = SolveOptions(
-        guess=guess,
-        board_shape="flat" if board_shape == "auto" else board_shape,
-        pixel_aspect=_held_aspect(pixel_aspect),
-        weights=weights or ("covariance" if careful else "equal"),
-        robust=careful if robust is None else robust,
-    )
-    check_abilities(engine, model, options)
-    return engine, options
-
-
-def check_abilities(engine: Solver, model: str, options: SolveOptions) -> None:
-    """Refuse what a solver is not able to do, naming those that are.
-
-    Raises
-    ------
-    InputError
-    """
-    lens_model(model)  # an unknown one is refused first
-    lacking = ", ".join(sorted(options.asked - engine.abilities))
-    if model in engine.models and not lacking:
-        return
-    what = f"is not able to do what is asked ({lacking})" if lacking else f"has no lens model {model!r}"
-    solvers = sorted(installed().solvers.values(), key=lambda solver: solver.name)
-    able = [s.name for s in solvers if model in s.models and options.asked <= s.abilities and s.missing() is None]
-    raise InputError(f"the solver {engine.name!r} {what}; solvers that are able: {', '.join(able) or 'none installed'}")
-
-
 def _check_views(observations: Observations) -> None:
     check_board_seen(observations)
     used, looked_at = len(observations.used), len(observations.views)
@@ -314,9 +260,3 @@ def _check_views(observations: Observations) -> None:
     # the same pose again adds no information: a solver would fail, or worse, not fail
     if all(np.array_equal(d.pixels, observations.detections[0].pixels) for d in observations.detections[1:]):
         raise InputError("all views show the board in the very same place; take views from different directions")
-
-
-def _held_aspect(pixel_aspect: PixelAspect | None) -> float | None:
-    if pixel_aspect is None or pixel_aspect == "free":
-        return None
-    return 1.0 if pixel_aspect == "square" else float(pixel_aspect)

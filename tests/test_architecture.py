@@ -35,7 +35,7 @@ TIERS = (
     "interfaces",
     "solving importing hookspecs",
     "registry",
-    "looking conformance",
+    "asking looking conformance",
     "journal cluster",
     "detecting",
     "pipeline demo camera_files",
