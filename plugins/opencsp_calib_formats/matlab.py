@@ -158,13 +158,20 @@ def _matrix(fields: Fields) -> Floats:
     if key is None:
         fx, fy = fields.numbers("FocalLength", 1, 2)[[0, -1]]
         cx, cy = fields.numbers("PrincipalPoint", 2)
-        skew = 0.0 if _is_empty(fields.values.get("Skew")) else fields.numbers("Skew", 1)[0]
-        return np.array([[fx, skew, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+        return np.array([[fx, _skew(fields), cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     found = fields.matrix(key, 3, 3) if isinstance(fields.raw(key), list) else fields.numbers(key, 9).reshape(3, 3)
     upright, turned = (found[2] == (0, 0, 1)).all(), (found[:, 2] == (0, 0, 1)).all()
     if upright == turned:
         raise FileFormatError(f"{fields.path(key)} is no camera matrix with a principal point, in either orientation")
     return np.array(found if upright else found.T)
+
+
+def _skew(fields: Fields) -> float:
+    """An array of one number in .mat files, a bare number in JSON, or nothing."""
+    value = fields.values.get("Skew")
+    if _is_empty(value):
+        return 0.0
+    return fields.number("Skew") if isinstance(value, int | float) else float(fields.numbers("Skew", 1)[0])
 
 
 def _scaramuzza(name: str, fields: Fields, size: tuple[int, int] | None) -> Imported:

@@ -73,6 +73,8 @@ def test_intrinsics_with_focal_length_and_skew(tmp_path: Path) -> None:
         IntrinsicMatrix=None, FocalLength=[[900.5, 901.5]], PrincipalPoint=[[503.0, 399.5]], Skew=np.array([[0.0]])
     )
     same_as_formula(read(tmp_path / "a.mat", structures({"p": fields}))["p"])
+    listed = {key: np.squeeze(value).tolist() for key, value in fields.items()}  # as jsonencode writes: Skew bare
+    same_as_formula(read(tmp_path / "b.json", json.dumps(listed).encode())["camera"])
     imported = read(tmp_path / "b.mat", structures({"p": {**fields, "Skew": 2.5}}))["p"]
     with pytest.raises(NotExactError, match=r"skew = 2.5 px"):
         exact(imported)
