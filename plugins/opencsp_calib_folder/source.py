@@ -52,7 +52,7 @@ class FolderSource:
 def _seconds(value: Any) -> float:
     try:
         seconds = float(value)
-    except ValueError:
+    except (TypeError, ValueError):
         seconds = -1.0
     if not 0 <= seconds < float("inf"):
         raise InputError(f"wait takes a number of seconds, not {value!r}")
@@ -64,7 +64,7 @@ def _images(folder: Path, wait_s: float) -> Iterator[Image]:
     growing: dict[Path, Growing] = {}
     last = time.monotonic()
     while True:
-        growing = {path: growing.get(path) or Growing(path) for path in images_in(folder) if path not in done}
+        growing = {path: growing.get(path) or Growing(path) for path in _there(folder) if path not in done}
         for path, file in growing.items():
             image = file.whole_image()
             if image is not None:
@@ -76,6 +76,13 @@ def _images(folder: Path, wait_s: float) -> Iterator[Image]:
             break
         time.sleep(POLL_S)
     log.info("no new image in %s for %g s", folder, wait_s)
+
+
+def _there(folder: Path) -> list[Path]:
+    try:
+        return images_in(folder)
+    except OSError as error:  # a drive that was pulled, a folder that was deleted
+        raise InputError(f"the folder {folder} cannot be read any more: {error.strerror}") from None
 
 
 class Growing:

@@ -1,5 +1,6 @@
 """The folder source: images that are there, images that come while it looks, and files that are none."""
 
+import shutil
 import threading
 import time
 from dataclasses import replace
@@ -35,6 +36,17 @@ def test_what_is_there_comes_in_natural_order_and_it_ends_when_nothing_new_comes
     (folder / "notes.txt").write_text("no image")
     with FolderSource().open(str(folder), wait="0") as images:
         assert levels(images) == [1, 2, 10]
+
+
+def test_a_folder_that_goes_away_says_so(tmp_path):
+    folder = tmp_path / "drive"
+    folder.mkdir()
+    write_image(np.full((6, 8), 7, dtype=np.uint8), folder / "a.png")
+    with FolderSource().open(str(folder), wait="300") as images:
+        assert levels(islice(images, 1)) == [7]
+        shutil.rmtree(folder)
+        with pytest.raises(InputError, match=r"drive cannot be read any more: "):
+            next(images)
 
 
 def test_what_comes_while_it_looks_is_taken_once_whole(tmp_path, monkeypatch):
