@@ -19,7 +19,7 @@ from opencsp_calib.options import SolveOptions
 from opencsp_calib.pose import Pose
 from opencsp_calib.rotations import rotation_matrices
 from opencsp_calib.shape_evidence import evidence_of
-from opencsp_calib.uncertainty import with_uncertainty
+from opencsp_calib.uncertainty import UNKNOWN, with_uncertainty
 
 __all__ = [
     "TURNED_DEG",
@@ -164,6 +164,7 @@ def _widest_directions_deg(given: Calibration) -> float:
 
 def _shape_solved(observations: Observations, options: SolveOptions, run: Run) -> Calibration:
     solved = with_uncertainty(run(observations, options))
-    if not np.isfinite(solved.covariance).all():
-        raise CalibrationFailedError(solved.problems[-1].message)
+    for problem in solved.problems:
+        if problem.code in UNKNOWN:
+            raise CalibrationFailedError(problem.message)
     return solved

@@ -25,7 +25,7 @@ FEW_VIEWS = 10
 COVERAGE_WANTED = 0.5
 ASPECT_SIGMAS, LEAST_ASPECT = 3.0, 1e-5  # of fx: less matters to nobody, and no board is as true to size
 RANGE_SPREAD = 1.1  # farthest over nearest view
-DISQUALIFYING = ("poor-rms", "not-converged", "head-on", "parallel", "fold-inside")
+DISQUALIFYING = ("poor-rms", "not-converged", "undetermined", "head-on", "parallel", "fold-inside")
 REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
 
 

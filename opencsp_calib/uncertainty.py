@@ -34,6 +34,7 @@ from opencsp_calib.quality import range_of
 from opencsp_calib.schur import Factorisation, factorise
 
 __all__ = [
+    "UNKNOWN",
     "Influence",
     "honest_covariance",
     "influence",
@@ -46,9 +47,11 @@ __all__ = [
     "with_uncertainty",
 ]
 
-UNKNOWN = {"undetermined", "uncertainty-unknown"}
+UNKNOWN = frozenset({"undetermined", "uncertainty-unknown"})
+"""Codes of problems that say: not even how far the camera is off can be told, or it may be off by anything."""
 ROUNDING = 1e-9  # px (or sigmas, where corners are weighted): what is left of exact corners tells nothing
 NOTICEABLE_PX = 0.01  # no corner is located better: a camera that moves by less has not moved for anybody
+OPEN = 0.01  # of the image's longer side: a camera known no better is as good as unknown
 MIN_VIEWS = 3  # with two views, leaving one out leaves nothing to compare
 
 
@@ -86,7 +89,8 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     -------
     Calibration
         `covariance` is the honest one. Both are NaN, and a `Problem` says so, where the views do not determine the
-        camera, or would not without one of them. A view on which the result hangs is named in another.
+        camera, or would not without one of them. Another is there where they hardly do, with covariances that tell by
+        how much; and one that names a view on which the result hangs.
     """
     if np.isfinite(calibration.covariance).all() or {p.code for p in calibration.problems} & UNKNOWN:
         return calibration
@@ -104,7 +108,7 @@ def with_uncertainty(calibration: Calibration) -> Calibration:
     calibration = replace(calibration, covariance=honest)
     jacobian = Alignment.at_infinity(calibration.camera).grid_jacobian
     hangs = _hangs_on(calibration, _influence(calibration, steps, jacobian), jacobian)
-    return calibration.with_problems(*hangs)
+    return calibration.with_problems(*_open_still(calibration, jacobian), *hangs)
 
 
 def _linearised(calibration: Calibration) -> tuple[Matrix, Floats, Factorisation]:
@@ -188,6 +192,23 @@ def _influence(calibration: Calibration, steps: Floats, jacobian: Floats) -> tup
     )
 
 
+def _open_still(calibration: Calibration, jacobian: Floats) -> tuple[Problem, ...]:
+    """Said where the honest sigma is so large that the camera is as good as unknown, however small the residuals."""
+    sigma_px = _mean_variance_px2(jacobian, calibration.covariance) ** 0.5
+    if sigma_px <= OPEN * max(calibration.camera.image_size):
+        return ()
+    message = (
+        f"the views do not determine the camera: over the image, what it sees is known to {sigma_px:.2g} px only; take "
+        "more of them, from different directions, or a simpler lens model"
+    )
+    return (Problem("undetermined", message),)
+
+
+def _mean_variance_px2(jacobian: Floats, covariance: Matrix) -> float:
+    """Of projections over the image, from (N, 2, P) derivatives by the parameters."""
+    return float(np.einsum("nij,jk,nik->n", jacobian, covariance, jacobian).mean())
+
+
 def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...], jacobian: Floats) -> tuple[Problem, ...]:
     """A view that moves the camera farther than all others together, and farther than the residuals explain.
 
@@ -195,7 +216,7 @@ def _hangs_on(calibration: Calibration, influences: tuple[Influence, ...], jacob
     freedom, whatever the number of views, so that even the honest sigma cannot be relied on.
     """
     most = max(influences, key=lambda i: i.share)
-    explained = np.einsum("nij,jk,nik->n", jacobian, calibration.covariance_residual, jacobian).mean()
+    explained = _mean_variance_px2(jacobian, calibration.covariance_residual)
     if not (most.share > 0.5 and most.shift_rms_px**2 > explained and most.shift_rms_px > NOTICEABLE_PX):
         return ()
     message = (

@@ -12,6 +12,7 @@ from scipy.stats import t as student
 
 from opencsp_calib import Calibration, Checkerboard, Observations, Pose, SolveOptions
 from opencsp_calib.detection import View
+from opencsp_calib.judgement import verdict
 from opencsp_calib.pipeline import detect
 from opencsp_calib.resampling import leaving_each_out
 from opencsp_calib.synthetic import bowed, demo_camera, observe, random_poses, seed_poses
@@ -180,6 +181,17 @@ def test_a_good_set_hangs_on_no_view() -> None:
     for seed in range(3):
         seen = observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, 20, seed), noise_px=0.05, rng=seed)
         assert not any(p.code == "hangs-on-view" for p in with_uncertainty(solved(seen)).problems)
+
+
+def test_a_camera_that_may_be_off_by_anything_is_said_to_be_undetermined() -> None:
+    """Three views of seven poor corners each."""
+    seen = observe(CAMERA, BOARD, seed_poses(BOARD, CAMERA, 3, 0), noise_px=0.8, rng=3)
+    few = np.isin(np.arange(54), [0, 8, 45, 53, 22, 13, 30])
+    views = tuple(replace(view, detection=view.detection.keeping(few)) for view in seen.views)
+    result = with_uncertainty(BundleSolver().solve(replace(seen, views=views), "opencv5", WAYS["flat"]))
+    assert result.problems[0].code == "undetermined"
+    assert np.isfinite(result.sigma).all()
+    assert verdict(result).level == "bad"
 
 
 def test_known_uncertainty_is_not_computed_again(observations: Observations) -> None:
