@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from opencsp_calib import dropping, judgement, pipeline
+from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.check import Judged, judged, worse
 from opencsp_calib.cluster import Scheduler
@@ -20,7 +21,7 @@ from opencsp_calib.hdf5_calibration import load_calibration, save_calibration
 from opencsp_calib.journal import Journal
 from opencsp_calib.summary import PIXEL_PITCH
 
-__all__ = ["CAMERA_FILE", "REPORT_FILE", "Change", "FleetResult", "calibrate_camera"]
+__all__ = ["CAMERA_FILE", "REPORT_FILE", "Change", "FleetResult", "board_below", "calibrate_camera"]
 
 CAMERA_FILE, REPORT_FILE = "camera.h5", "report.html"
 OF_DETECTION = ("detector", "refine")
@@ -149,7 +150,7 @@ def _solved(camera: FleetCamera, **how: Any) -> Calibration:
     if "board" not in settings:
         raise InputError("which board was photographed is not said; add board: SPEC, or --board SPEC")
     images = [str(camera.root / pattern) for pattern in camera.images]
-    board = pipeline.board_from(_below(camera.root, settings["board"]))
+    board = board_below(camera.root, settings["board"])
     finding = {key: settings[key] for key in OF_DETECTION if key in settings}
     options = {key.replace("-", "_"): settings[key] for key in OF_SOLVING if key in settings}
     pipeline.check_solving(**options)
@@ -161,9 +162,9 @@ def _solved(camera: FleetCamera, **how: Any) -> Calibration:
     return pipeline.solve(observations, **options)
 
 
-def _below(root: Path, board: str) -> str:
-    """A board file lies beside the fleet's; a description is no path."""
-    return str(root / board) if (root / board).is_file() else board
+def board_below(root: Path, board: str) -> Board:
+    """As `pipeline.board_from`, but that a board file's name starts from the fleet's folder."""
+    return pipeline.board_from(str(root / board) if (root / board).is_file() else board)
 
 
 def _record(settings: Any) -> dict[str, str]:

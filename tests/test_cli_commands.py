@@ -15,6 +15,7 @@ from worlds import SmallWorld
 from opencsp_calib import Camera
 from opencsp_calib.cli import run
 from opencsp_calib.images import find_images, read_image
+from opencsp_calib.models import LENS_MODELS
 
 
 def test_compare_says_how_far_apart(small_world: SmallWorld, camera_file: Path, tmp_path: Path, capsys) -> None:
@@ -105,6 +106,8 @@ def test_help_is_quick_as_it_loads_nothing_that_it_does_not_need() -> None:
     result = subprocess.run(command, capture_output=True, text=True, check=True)
     assert "--board SPEC" in result.stdout
     assert "Solving:" in result.stdout
+    for model in LENS_MODELS:
+        assert model in " ".join(result.stdout.split())
     loaded = set(re.findall(r"\| +(\w+)", result.stderr))
     assert "typer" in loaded
     assert not loaded & {"numpy", "scipy", "cv2", "matplotlib", "h5py", "rich", "nicegui", "distributed"}

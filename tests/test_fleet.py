@@ -141,9 +141,13 @@ def test_wrong_use(
 def test_a_board_must_be_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "1.png").write_bytes(b"")
-    (failed,) = answer(capsys, "fleet", tmp_path, code=1)["cameras"]
-    assert failed["verdict"] == "failed"
-    assert "--board SPEC" in failed["sentence"]
+    assert "--board SPEC" in complaint(capsys, "fleet", tmp_path)
+    assert "'foo'" in complaint(capsys, "fleet", tmp_path, "--board", "foo")
+    assert "'magic'" in complaint(capsys, "fleet", tmp_path, *BOARD, "--solver", "magic")
+    assert [path.name for path in tmp_path.iterdir()] == ["a"]
+    (tmp_path / "fleet.yaml").write_text(f"cameras: {{a: {{}}, b: {{images: a, board: '{SmallWorld.spec}'}}}}")
+    failed = answer(capsys, "fleet", tmp_path, code=1)["cameras"]
+    assert ["--board SPEC" in camera["sentence"] for camera in failed] == [True, False]
 
 
 def test_folders_in_natural_order(tmp_path: Path) -> None:

@@ -31,7 +31,10 @@ Jobs = Annotated[
     int | None, typer.Option(min=1, max=1024, metavar="N", help="Images at a time; by default one per core.")
 ]
 Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on from what an interrupted run has done: it is kept in FILE.journal.")
+    bool,
+    typer.Option(
+        "--resume", help="Go on from what an interrupted run has done: a .journal beside the output keeps it."
+    ),
 ]
 SchedulerAddress = Annotated[
     str | None,

@@ -14,7 +14,9 @@ CameraFile = Annotated[Path, typer.Argument(metavar="CAMERA", help="A camera fil
 CameraName = Annotated[
     str | None, typer.Option("--camera", metavar="NAME", help="Which camera of a file that has several.")
 ]
-FromFormat = Annotated[str | None, typer.Option("--from", metavar="F", help="The format, where it cannot be told.")]
+FromFormat = Annotated[
+    str | None, typer.Option("--from", metavar="FORMAT", help="The format, where it cannot be told.")
+]
 ImageSize = Annotated[str | None, typer.Option(metavar="WxH", help="The image size, where the file does not have it.")]
 
 

@@ -53,7 +53,10 @@ def compare(
         typer.Option(metavar="NAME", help="Which camera of a file that has several; given twice, of A and of B."),
     ] = None,
     image_size: ImageSize = None,
-    range_m: Annotated[float | None, typer.Option("--range", min=1e-6, metavar="M", help="At this distance.")] = None,
+    range_m: Annotated[
+        float | None,
+        typer.Option("--range", min=1e-6, metavar="M", help="At this distance; by default at infinity."),
+    ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="A picture of the difference.")] = None,
     json: args.Json = False,
 ) -> None:

@@ -25,7 +25,7 @@ def convert(
     ] = None,
     target: Annotated[Path | None, typer.Argument(metavar="OUT", help="The camera file to write.")] = None,
     from_format: FromFormat = None,
-    to_format: Annotated[str | None, typer.Option("--to", metavar="F", help="The format to write.")] = None,
+    to_format: Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="The format to write.")] = None,
     camera: CameraName = None,
     fit: Fit = None,
     accept_error: AcceptError = None,

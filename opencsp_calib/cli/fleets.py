@@ -46,6 +46,7 @@ def fleet(
 
     started = time.perf_counter()
     cameras = find_fleet(where, args.given(board=board, model=model, solver=solver))
+    _check_asked(cameras, board, args.given(model=model, solver=solver))
     root = output or cameras[0].root
     _make(root)
     results = _calibrated(cameras, root, resume, jobs, scheduler)
@@ -65,6 +66,18 @@ def fleet(
 
 
 COMMANDS = (fleet,)
+
+
+def _check_asked(cameras: "tuple[FleetCamera, ...]", board: str | None, solving: dict[str, str]) -> None:
+    """Refuse what is asked of all cameras and none can do, before anything is begun."""
+    from opencsp_calib.fleet import board_below
+    from opencsp_calib.pipeline import check_solving
+
+    if not any("board" in camera.settings for camera in cameras):
+        raise InputError("which board was photographed is not said; add --board SPEC")
+    if board is not None:
+        board_below(cameras[0].root, board)
+    check_solving(**solving)
 
 
 def _make(root: Path) -> None:

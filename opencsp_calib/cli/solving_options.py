@@ -19,7 +19,13 @@ __all__ = ["Model", "SolverName", "with_solving_options"]
 SOLVING = "Solving"
 
 Model = Annotated[
-    str | None, typer.Option(metavar="MODEL", help="The lens model.", show_default="opencv4", rich_help_panel=SOLVING)
+    str | None,
+    typer.Option(
+        metavar="MODEL",
+        help="The lens model: pinhole, opencv4, opencv5, opencv8, opencv12, opencv14 or opencv_fisheye.",
+        show_default="opencv4",
+        rich_help_panel=SOLVING,
+    ),
 ]
 SolverName = Annotated[
     str | None,

@@ -18,7 +18,7 @@ def gui(
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the address in the browser.")] = True,
     host: Annotated[
         str,
-        typer.Option(metavar="H", help="Listen on another address, so that other machines can reach it."),
+        typer.Option(metavar="ADDRESS", help="Listen on another address, so that other machines can reach it."),
     ] = HOST,
 ) -> None:
     """Calibrate in a window of the browser."""

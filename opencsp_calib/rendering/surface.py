@@ -30,7 +30,7 @@ class Nodes:
     Parameters
     ----------
     step_px, first_px : int
-        The x and y of the first node, and from node to node.
+        From node to node, in x and in y; the first node's x, which is its y too.
     x, y : (rows, columns) m
         In the frame of the board as it is drawn, before it was bent; NaN where the board's plane is not before it.
     """
