@@ -16,7 +16,14 @@ LEVELS: dict[str, Level] = {"good": "good", "doubt": "info", "bad": "bad"}
 
 
 def find_corners(session: Session) -> None:
-    """Look for the board in all photographs."""
+    """Look for the board in all photographs; where some are gone since they were selected, this is said first."""
+    selected = session.selection.paths
+    wrong = session.selection.look_up()
+    there = set(session.selection.paths.values())
+    if gone := [name for name, path in selected.items() if path not in there]:
+        text = f"No longer there: {', '.join(gone)}. Find the corners of the others, or select photographs again."
+        session.say("; ".join((*wrong, text)), "bad")
+        return
     session.start("Finding corners", partial(_find_corners, session), len(session.selection.files))
 
 

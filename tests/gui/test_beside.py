@@ -206,7 +206,11 @@ def test_a_measured_board_and_a_camera_that_is_no_file_name(window: Window, phot
     window.choose("Board", "in a file")
     window.type("board-described", "board.json")
     window.until(lambda: window.enabled("find-corners"))
+    (folder / "set" / "05.png").unlink()
+    window.click("find-corners")
+    window.until(lambda: window.status.startswith("No longer there: 05.png."))
     window.find_corners()
+    assert window.status == "The board is found in 4 of 4 photographs."
     window.calibrate()
     window.click("save-camera")
     window.until(lambda: window.status == "Camera saved: evil v1.2.h5")
