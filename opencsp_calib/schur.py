@@ -15,7 +15,6 @@ again, view after view, where it is needed.
 
 import mmap
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -152,7 +151,7 @@ class PosesKept(Factorisation):
         shared = _damped(equations.shared.sum(axis=0), damping)
         reduced = np.block([[_block_diagonal(_damped(equations.pose, damping)), ties], [ties.T, shared]])
         for part in coupling:
-            _add_lower(reduced, -part.T, part.T)
+            _subtract_lower(reduced, part.T, part.T)
         return cls(equations, inverse_roots, *_scaled_root(reduced, equations.gauge()[1].reshape(poses, -1)), coupling)
 
     def newton_step(self) -> Parts:
@@ -207,10 +206,8 @@ class CornersKept(Factorisation):
         reduced[corners:, :corners] = equations.corner_shared.swapaxes(0, 1).reshape(equations.unknowns.shared, corners)
         reduced[corners:, corners:] = _damped(equations.shared.sum(axis=0), damping)
         gradient = np.concatenate([equations.corner_gradient.T.ravel(), equations.shared_gradient.sum(axis=0)])
-        alone = inverse_roots @ equations.pose_gradient[:, :, None]
-        for views, coupling in _couplings(equations, inverse_roots):
-            _add_lower(reduced, -coupling, coupling)
-            gradient -= alone[views].ravel() @ coupling
+        for begin in range(0, len(inverse_roots), TOGETHER):
+            _eliminate(equations, inverse_roots, slice(begin, begin + TOGETHER), reduced, gradient)
         gauge = equations.gauge()[0].transpose(1, 0, 2).reshape(corners, 7)
         return cls(equations, inverse_roots, *_scaled_root(reduced, gauge), gradient)
 
@@ -230,17 +227,29 @@ class CornersKept(Factorisation):
         return np.roll(self._dense(np.roll(right, -shared, axis=0)), shared, axis=0)
 
 
-def _couplings(equations: NormalEquations, inverse_roots: Floats) -> Iterator[tuple[slice, Matrix]]:
-    """Runs of n views, and (6 n, 3 C + M) what ties their poses to the rest, multiplied by the poses' inverse roots."""
-    views, corners = len(inverse_roots), len(equations.corner)
-    for begin in range(0, views, TOGETHER):
-        run = slice(begin, min(begin + TOGETHER, views))
-        ties = np.zeros((run.stop - begin, POSE, CORNER * corners + equations.unknowns.shared))
-        ties[:, :, CORNER * corners :] = equations.shared_pose[run].transpose(0, 2, 1)
-        blocks = ties[:, :, : CORNER * corners].reshape(len(ties), POSE, CORNER, corners)
-        for rows in equations.rows(begin, run.stop):
-            blocks[rows.view - begin][:, :, rows.columns] = rows.pose_corner()
-        yield run, (inverse_roots[run] @ ties).reshape(-1, ties.shape[2])
+def _eliminate(
+    equations: NormalEquations, inverse_roots: Floats, views: slice, reduced: Matrix, gradient: Floats
+) -> None:
+    """Take the poses of a run of views out of what is kept: its matrix (3 C + M, 3 C + M) and its gradient (3 C + M,).
+
+    What ties one run's poses to the rest is a megabyte or more, and gone before the next one's is made.
+    """
+    coupling = _coupling(equations, inverse_roots, views)
+    alone = inverse_roots[views] @ equations.pose_gradient[views, :, None]
+    _subtract_lower(reduced, coupling, coupling)
+    gradient -= alone.ravel() @ coupling
+
+
+def _coupling(equations: NormalEquations, inverse_roots: Floats, views: slice) -> Matrix:
+    """(6 n, 3 C + M) what ties the poses of n views to the rest, multiplied by the poses' inverse roots."""
+    corners = len(equations.corner)
+    shared_pose = equations.shared_pose[views]
+    ties = np.zeros((len(shared_pose), POSE, CORNER * corners + equations.unknowns.shared))
+    ties[:, :, CORNER * corners :] = shared_pose.transpose(0, 2, 1)
+    blocks = ties[:, :, : CORNER * corners].reshape(len(ties), POSE, CORNER, corners)
+    for rows in equations.rows(views.start, views.start + len(ties)):
+        blocks[rows.view - views.start][:, :, rows.columns] = rows.pose_corner()
+    return np.asarray((inverse_roots[views] @ ties).reshape(-1, ties.shape[2]))
 
 
 def _zeros_apart(size: int) -> Matrix:
@@ -264,14 +273,14 @@ def _block_diagonal(blocks: Floats) -> Matrix:
     return matrix.reshape(count * size, count * size)
 
 
-def _add_lower(matrix: Matrix, left: Matrix, right: Matrix) -> None:
-    """Add the product leftᵀ right (k, k) of two matrices (n, k) to another one's lower triangle: half of the work.
+def _subtract_lower(matrix: Matrix, left: Matrix, right: Matrix) -> None:
+    """Take the product leftᵀ right (k, k) of two matrices (n, k) from another one's lower triangle: half of the work.
 
-    Above the diagonal some of it is added, too.
+    Above the diagonal some of it is taken, too.
     """
     for first in range(0, len(matrix), STRIP):
         strip = slice(first, min(first + STRIP, len(matrix)))
-        matrix[strip, : strip.stop] += left[:, strip].T @ right[:, : strip.stop]
+        matrix[strip, : strip.stop] += -left[:, strip].T @ right[:, : strip.stop]
 
 
 def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
@@ -283,11 +292,11 @@ def _scaled_root(dense: Matrix, gauge: Floats) -> tuple[Floats, CholeskyRoot]:
     if not (diagonal > 0).all():
         raise np.linalg.LinAlgError("an unknown is not observed at all")
     scale = 1.0 / np.sqrt(diagonal)
-    for first in range(0, len(dense), STRIP):  # the strips of the lower triangle, as `_add_lower` goes over them
+    for first in range(0, len(dense), STRIP):  # the strips of the lower triangle, as `_subtract_lower` goes over them
         strip = slice(first, min(first + STRIP, len(dense)))
         dense[strip, : strip.stop] *= scale[strip, None]
         dense[strip, : strip.stop] *= scale[: strip.stop]
     if gauge.any():
         free, _ = np.linalg.qr(gauge / scale[: len(gauge), None])
-        _add_lower(dense[: len(gauge), : len(gauge)], free.T, free.T)
+        _subtract_lower(dense[: len(gauge), : len(gauge)], -free.T, free.T)
     return scale, CholeskyRoot.of(dense)

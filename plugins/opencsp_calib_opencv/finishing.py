@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from opencsp_calib.arrays import Floats, Matrix, Params
+from opencsp_calib.arrays import Floats, Matrix, Params, Points
+from opencsp_calib.detection import Detection
 from opencsp_calib.unknowns import camera_basis
 from opencsp_calib.valley import arrived, camera_step, lowest
 
@@ -69,7 +70,7 @@ class _Place(NamedTuple):
 
 
 def finish(
-    found: Solution, points: Sequence[Floats], pixels: Sequence[Floats], pixel_aspect: float | None = None
+    found: Solution, points: Points, detections: Sequence[Detection], pixel_aspect: float | None = None
 ) -> Solution:
     """Where the sum of squares is least, next to a solution.
 
@@ -79,18 +80,19 @@ def finish(
     ----------
     found : Solution
         OpenCV's.
-    points : sequence of (n, 3)
-        The board's, as each view sees them.
-    pixels : sequence of (n, 2)
+    points : (K, 3)
+        The board's, in the unit of the translations.
+    detections : sequence of Detection
+        One per view.
     pixel_aspect : float, optional
         fy / fx, where it is held.
     """
-    free, numbers = camera_basis(len(found.params), pixel_aspect), 2 * sum(len(view) for view in pixels)
+    free, numbers = camera_basis(len(found.params), pixel_aspect), 2 * sum(map(len, detections))
 
     def at(solution: Solution) -> _Place | None:
         with np.errstate(all="ignore"):  # what OpenCV found may be wild
             try:
-                return _at(solution, points, pixels, free)
+                return _at(solution, points, detections, free)
             except np.linalg.LinAlgError:
                 return None
 
@@ -104,9 +106,11 @@ def finish(
     return _moved(end, camera_step(end.triangle, 0.0), free) if arrived(end) else end.solution
 
 
-def _at(solution: Solution, points: Sequence[Floats], pixels: Sequence[Floats], free: Matrix) -> _Place:
-    views = zip(points, pixels, solution.rotations, solution.translations, strict=True)
-    triangles = np.array([_triangle(_rows(solution.params, free, *view)) for view in views])
+def _at(solution: Solution, points: Points, detections: Sequence[Detection], free: Matrix) -> _Place:
+    views = zip(detections, solution.rotations, solution.translations, strict=True)
+    triangles = np.array(
+        [_triangle(_rows(solution.params, free, points[d.ids], d.pixels, *pose)) for d, *pose in views]
+    )
     together = _triangle(triangles[:, POSE:, POSE:].reshape(-1, free.shape[1] + 1))
     return _Place(solution, triangles, together, float((triangles[:, :, -1] ** 2).sum()))
 

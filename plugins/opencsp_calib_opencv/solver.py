@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from opencsp_calib import CalibrationFailedError, InputError, Observations, SolveOptions
+from opencsp_calib import Board, CalibrationFailedError, InputError, Observations, SolveOptions
+from opencsp_calib.arrays import Points
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.convergence import determined
 from opencsp_calib.initial import initial_camera
@@ -70,11 +71,11 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
         start = initial_camera(observations, model, options.guess, options.pixel_aspect)
         matrix, distortion[:count] = start.matrix, start.distortion
         flags |= cv2.CALIB_USE_INTRINSIC_GUESS
-    points, pixels = _vendor_points(observations)
+    points, detections = _vendor_points(observations.board), observations.detections
     with _vendor_errors(cv2, observations):
         _, matrix, distortion, rotations, translations = cv2.calibrateCamera(
-            [p.astype(np.float32) for p in points],
-            [p.astype(np.float32) for p in pixels],
+            [points[d.ids].astype(np.float32) for d in detections],
+            [d.pixels.astype(np.float32) for d in detections],
             observations.image_size,
             matrix,
             distortion,
@@ -82,7 +83,7 @@ def _solve_pinhole(observations: Observations, model: str, options: SolveOptions
             criteria=_criteria(cv2),
         )
         found = _unpacked(matrix, np.ravel(distortion)[:count], rotations, translations)
-        return finish(found, points, pixels, options.pixel_aspect)
+        return finish(found, points, detections, options.pixel_aspect)
 
 
 def _solve_fisheye(observations: Observations, model: str, options: SolveOptions) -> Solution:
@@ -92,11 +93,11 @@ def _solve_fisheye(observations: Observations, model: str, options: SolveOptions
         raise InputError("OpenCV cannot hold the pixel aspect of a fisheye; leave it free or take another solver")
     start = initial_camera(observations, model, options.guess)
     flags = cv2.fisheye if hasattr(cv2.fisheye, "CALIB_FIX_SKEW") else cv2  # OpenCV 5 has moved them
-    points, pixels = _vendor_points(observations)
+    points, detections = _vendor_points(observations.board), observations.detections
     with _vendor_errors(cv2, observations):
         _, matrix, distortion, rotations, translations = cv2.fisheye.calibrate(
-            [p[None] for p in points],  # one row each: OpenCV 5 fails on columns
-            [p[None] for p in pixels],
+            [points[d.ids][None] for d in detections],  # one row each: OpenCV 5 fails on columns
+            [d.pixels[None] for d in detections],
             observations.image_size,
             start.matrix,
             start.distortion.copy(),
@@ -124,11 +125,9 @@ def _criteria(cv2: ModuleType) -> tuple[int, int, float]:
     return cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, ITERATIONS, SMALLEST_STEP
 
 
-def _vendor_points(observations: Observations) -> tuple[list[Any], list[Any]]:
-    """Board points (n, 3) in units of the spacing, where even ones are exact in single precision, and pixels (n, 2)."""
-    board = observations.board
-    points: list[Any] = [board.points[d.ids] / board.spacing_m for d in observations.detections]
-    return points, [d.pixels for d in observations.detections]
+def _vendor_points(board: Board) -> Points:
+    """(K, 3) the board's in units of the spacing, where even ones are exact in single precision."""
+    return board.points / board.spacing_m
 
 
 def _unpacked(matrix: Any, distortion: Any, rotations: Any, translations: Any) -> Solution:
