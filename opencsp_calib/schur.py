@@ -274,10 +274,7 @@ def _block_diagonal(blocks: Floats) -> Matrix:
 
 
 def _subtract_lower(matrix: Matrix, left: Matrix, right: Matrix) -> None:
-    """Take the product leftᵀ right (k, k) of two matrices (n, k) from another one's lower triangle: half of the work.
-
-    Above the diagonal some of it is taken, too.
-    """
+    """Take leftᵀ right (k, k), of matrices (n, k), from one's lower triangle, and some from above it: half of the work."""
     for first in range(0, len(matrix), STRIP):
         strip = slice(first, min(first + STRIP, len(matrix)))
         matrix[strip, : strip.stop] += -left[:, strip].T @ right[:, : strip.stop]

@@ -51,7 +51,7 @@ def saddle_pixels(grey: NDArray[np.float32], most: int) -> Pixels:
     strength = xy * xy
     strength -= xx * yy
     around = cv2.dilate(strength, np.ones((5, 5), np.uint8))
-    peaks = cv2.compare(strength, cv2.max(around, SMALLEST_STRENGTH), cv2.CMP_GE)
+    peaks = cv2.compare(strength, cv2.max(around, SMALLEST_STRENGTH, around), cv2.CMP_GE)
     border = int(RING_PX) + 2
     inside = cv2.findNonZero(peaks[border:-border, border:-border])
     x, y = np.zeros((2, 0), dtype=np.int64) if inside is None else inside.reshape(-1, 2).T.astype(np.int64) + border
