@@ -101,14 +101,14 @@ class CornerTable:
         whitening[1, 0] = -xy / xx * whitening[1, 1]
         return whitening if factors is None else whitening * factors
 
-    def whitened(self, residuals: Floats) -> Floats:
-        """Residuals (N, 2) px, multiplied by what they are before they are squared."""
-        found = residuals.copy()
+    def whitened_lengths(self, residuals: Floats) -> Floats:
+        """(N,) of residuals (N, 2) px, multiplied by what they are before they are squared."""
+        found = np.empty(len(self))
         for run in self.chunks():
             whitening, span = self.whitening(*run), self.span(*run)
-            if whitening is not None:
-                found[span] = np.einsum("ijn,nj->ni", whitening, residuals[span])
-        return np.asarray(found)
+            here = residuals[span] if whitening is None else np.einsum("ijn,nj->ni", whitening, residuals[span])
+            np.hypot(*here.T, out=found[span])
+        return found
 
     @cached_property
     def typical_weight(self) -> float:
@@ -129,7 +129,7 @@ class CornerTable:
         """(N,) which corners are of the views that a slice takes."""
         taken = np.zeros(len(self.counts), dtype=np.bool_)
         taken[views] = True
-        return taken[self.view]
+        return np.repeat(taken, self.counts)
 
     def of_views(self, views: slice) -> "CornerTable":
         """Only the views that a slice takes, in the order they are in."""

@@ -274,7 +274,7 @@ def _block_diagonal(blocks: Floats) -> Matrix:
 
 
 def _subtract_lower(matrix: Matrix, left: Matrix, right: Matrix) -> None:
-    """Take leftᵀ right (k, k), of matrices (n, k), from one's lower triangle, and some from above it: half of the work."""
+    """Take leftᵀ right (k, k), of matrices (n, k), from a lower triangle, and from a little above: half of the work."""
     for first in range(0, len(matrix), STRIP):
         strip = slice(first, min(first + STRIP, len(matrix)))
         matrix[strip, : strip.stop] += -left[:, strip].T @ right[:, : strip.stop]

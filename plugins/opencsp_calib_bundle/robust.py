@@ -34,11 +34,12 @@ def outlying(table: CornerTable, residuals: Floats) -> Mask:
     """(N,) which corners lie beyond the limit, from residuals (N, 2) px; all that have no image do."""
     lengths, scale = _lengths(table, residuals)
     of_views = np.array([np.median(part) for part in np.split(lengths, table.first[1:-1])]) / MEDIAN_LENGTH
-    return lengths > LIMIT * np.where(of_views > RUBBISH * scale, scale, np.maximum(scale, of_views))[table.view]
+    limits = LIMIT * np.where(of_views > RUBBISH * scale, scale, np.maximum(scale, of_views))
+    return lengths > np.repeat(limits, table.counts)
 
 
 def _lengths(table: CornerTable, residuals: Floats) -> tuple[Floats, float]:
     """(N,) lengths of the whitened residuals, and the standard deviation per axis that their median tells of."""
-    lengths = np.hypot(*table.whitened(residuals).T)
+    lengths = table.whitened_lengths(residuals)
     lengths[np.isnan(lengths)] = np.inf
     return lengths, max(float(np.median(lengths)) / MEDIAN_LENGTH, SMALLEST_PX * table.typical_weight)
