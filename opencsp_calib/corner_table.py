@@ -107,7 +107,7 @@ class CornerTable:
         for run in self.chunks():
             whitening, span = self.whitening(*run), self.span(*run)
             here = residuals[span] if whitening is None else np.einsum("ijn,nj->ni", whitening, residuals[span])
-            np.hypot(*here.T, out=found[span])
+            found[span] = np.hypot(*here.T)
         return found
 
     @cached_property
