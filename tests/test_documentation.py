@@ -35,7 +35,6 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 PAGES += [page for page in sorted((ROOT / "docs").glob("*.md")) if page.name not in GENERATED]
 SHORTER = {
     "opencsp-calib demo demo": "opencsp-calib demo demo --views 4",
-    "opencsp-calib demo": "opencsp-calib demo --views 4",
 }
 FIRST = "opencsp-calib calibrate photographs/ --board checkerboard:21x18:20mm -o camera.h5 --report report.html"
 BOARD = Checkerboard(21, 18, 0.02)

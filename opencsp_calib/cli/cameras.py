@@ -47,7 +47,7 @@ def show(
 
 def compare(
     a: Annotated[Path, typer.Argument(metavar="A", help="A camera file of any format we read.")],
-    b: Annotated[Path, typer.Argument(metavar="B", help="The one to compare it with, likewise.")],
+    b: Annotated[Path, typer.Argument(metavar="B", help="Another camera file, to compare it with.")],
     camera: Annotated[
         list[str] | None,
         typer.Option(metavar="NAME", help="Which camera of a file that has several; given twice, of A and of B."),
