@@ -10,11 +10,20 @@ from opencsp_calib.errors import CalibrationFailedError
 from opencsp_calib.normal_equations import NormalEquations, normal_equations
 from opencsp_calib.schur import Factorisation, factorise
 
-__all__ = ["CONVERGED_SIGMAS", "LEAST_SIGMA_PX", "OPEN_CENTRE", "OPEN_FOCAL", "determined", "remaining_sigmas"]
+__all__ = [
+    "CONVERGED_SIGMAS",
+    "LEAST_SIGMA_PX",
+    "OPEN_CENTRE",
+    "OPEN_FOCAL",
+    "determined",
+    "remaining_sigmas",
+    "undetermined",
+]
 
 CONVERGED_SIGMAS = 0.1  # pixels rounded to single precision, which some engines take, leave some 0.01
 SMALLEST_NOISE_PX = 1e-3  # of any detector: what is found of exact pixels is judged against this
 LEAST_SIGMA_PX = 0.01  # of a corner, per axis: exact corners of a bad set of views are no better set
+MISFIT_PX = 5.0  # rms beyond which something else than noise is wrong
 OPEN_FOCAL = 0.05  # sigma of a focal length over the focal length, above which it is as good as unknown
 OPEN_CENTRE = 0.2  # sigma of the principal point over the image's longer side, likewise
 
@@ -42,7 +51,7 @@ def determined(calibration: Calibration) -> Calibration:
     try:
         factor = factorise(equations)
     except np.linalg.LinAlgError:
-        raise CalibrationFailedError(_undetermined(calibration, "camera")) from None
+        raise _undetermined(calibration, "camera") from None
     _check_determined(calibration, equations, factor)
     if warped or calibration.options.weights != "equal":
         return calibration
@@ -89,14 +98,27 @@ def _check_determined(calibration: Calibration, equations: NormalEquations, fact
     sigma = noise_px * np.sqrt(np.diag(information)[:4])
     camera = calibration.camera
     if not (sigma[:2] <= OPEN_FOCAL * camera.params[:2]).all():  # NaN is not
-        raise CalibrationFailedError(_undetermined(calibration, "focal length"))
+        raise _undetermined(calibration, "focal length")
     if not (sigma[2:] <= OPEN_CENTRE * max(camera.image_size)).all():
-        raise CalibrationFailedError(_undetermined(calibration, "principal point"))
+        raise _undetermined(calibration, "principal point")
 
 
-def _undetermined(calibration: Calibration, what: str) -> str:
-    views = len(calibration.cam_from_board)
-    return (
-        f"{views} views do not determine the {what}: take more, with the board tilted by 30 to 45 degrees in different "
-        "directions, or a simpler lens model"
-    )
+def undetermined(views: int, what: str, rms_px: float) -> CalibrationFailedError:
+    """The error that so many views do not determine the camera, or what of it; with what to do.
+
+    Parameters
+    ----------
+    views : int
+    what : str
+        Such as ``focal length``.
+    rms_px : float
+        Of the residuals: where it is large, something else than too few views is wrong.
+    """
+    cure = "take more, with the board tilted by 30 to 45 degrees in different directions, or a simpler lens model"
+    if rms_px > MISFIT_PX:
+        cure = f"their corners do not fit the board (rms {rms_px:.1f} px); check its description and the photographs"
+    return CalibrationFailedError(f"{views} views do not determine the {what}: {cure}")
+
+
+def _undetermined(calibration: Calibration, what: str) -> CalibrationFailedError:
+    return undetermined(len(calibration.cam_from_board), what, calibration.rms_px)

@@ -19,7 +19,7 @@ from opencsp_calib.camera import Camera
 from opencsp_calib.cluster import Scheduler
 from opencsp_calib.detecting import Progress, Stop, check_board_seen, look_at
 from opencsp_calib.detection import Observations
-from opencsp_calib.errors import InputError
+from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.hdf5_calibration import load_calibration
 from opencsp_calib.images import find_images
 from opencsp_calib.interfaces import Detector
@@ -179,10 +179,15 @@ def solve(
         return engine.solve(views, model, chosen)
 
     decides = board_shape == "auto" and "board_free" in engine.abilities
-    with blas_on_one_thread():
-        solving = shapes.decide if decides else shapes.solve_with_aspect
-        as_it_is = pixel_aspect is not None or "pixel_aspect" not in engine.abilities
-        solved = with_uncertainty(solving(observations, options, run, aspect_given=as_it_is))
+    solving = shapes.decide if decides else shapes.solve_with_aspect
+    as_it_is = pixel_aspect is not None or "pixel_aspect" not in engine.abilities
+    try:
+        with blas_on_one_thread():
+            solved = with_uncertainty(solving(observations, options, run, aspect_given=as_it_is))
+    except CalibrationFailedError as error:
+        if guess is None:
+            raise
+        raise CalibrationFailedError(f"{error}; it may also be the guess: try without it") from error
     return replace(
         solved,
         camera=replace(solved.camera, name=name),

@@ -14,6 +14,7 @@ from worlds import SmallWorld
 import opencsp_calib
 from opencsp_calib import (
     Calibration,
+    Camera,
     Checkerboard,
     Detection,
     Image,
@@ -26,7 +27,7 @@ from opencsp_calib import (
 )
 from opencsp_calib.detecting import check_board_seen, look_at
 from opencsp_calib.dropping import drop_above, drop_worst, excluding
-from opencsp_calib.errors import CancelledError
+from opencsp_calib.errors import CalibrationFailedError, CancelledError
 from opencsp_calib.images import find_images
 from opencsp_calib.judgement import judge
 from opencsp_calib.looking import Search
@@ -150,6 +151,12 @@ def test_dropping(seen: Observations) -> None:
 def test_what_cannot_be_asked_is_refused(seen: Observations, options: dict, words: str) -> None:
     with pytest.raises(InputError, match=words):
         solve(seen, **options)
+
+
+def test_where_a_guess_leads_nowhere_it_is_doubted_too(seen: Observations) -> None:
+    guess = Camera("far off", "pinhole", [900.0, 900.0, 5000.0, 240.0], seen.image_size)
+    with pytest.raises(CalibrationFailedError, match="it may also be the guess: try without it"):
+        solve(seen, solver="opencv", guess=guess)
 
 
 def test_the_same_view_again_and_again_is_refused(seen: Observations) -> None:

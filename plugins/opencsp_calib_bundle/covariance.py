@@ -4,14 +4,12 @@ import numpy as np
 
 from opencsp_calib import CalibrationFailedError, Observations, SolveOptions
 from opencsp_calib.arrays import Floats, Matrix
-from opencsp_calib.convergence import LEAST_SIGMA_PX, OPEN_CENTRE, OPEN_FOCAL
+from opencsp_calib.convergence import LEAST_SIGMA_PX, OPEN_CENTRE, OPEN_FOCAL, undetermined
 from opencsp_calib.models import LensModel
 from opencsp_calib.schur import factorise
 from opencsp_calib_bundle.levenberg_marquardt import Minimum
 
 __all__ = ["checked_covariance"]
-
-MISFIT_PX = 5.0  # rms beyond which something else than noise is wrong
 
 
 def checked_covariance(
@@ -63,8 +61,4 @@ def _check_determined(views: int, relative: Floats, rms_px: float) -> None:
     limits = np.array([OPEN_FOCAL, OPEN_FOCAL, OPEN_CENTRE, OPEN_CENTRE])
     if (relative <= limits).all():  # NaN is not
         return
-    what = "principal point" if (relative[:2] <= OPEN_FOCAL).all() else "focal length"
-    cure = "take more, with the board tilted by 30 to 45 degrees in different directions, or a simpler lens model"
-    if rms_px > MISFIT_PX:
-        cure = f"their corners do not fit the board (rms {rms_px:.1f} px); check its description and the photographs"
-    raise CalibrationFailedError(f"{views} views do not determine the {what}: {cure}")
+    raise undetermined(views, "principal point" if (relative[:2] <= OPEN_FOCAL).all() else "focal length", rms_px)
