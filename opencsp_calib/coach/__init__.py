@@ -9,7 +9,7 @@
     wording.py     that, in words and drawn with characters
     moment.py      gauges of one frame, and whether this is the moment for a photograph
 
-All of it are functions of frozen values but for `preview`, which remembers the frame before.
+All of these are functions of frozen values, but for `preview`, which remembers the frame before.
 """
 
 from opencsp_calib.coach.knowledge import Knowledge, learn

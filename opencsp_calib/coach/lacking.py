@@ -14,7 +14,7 @@ from opencsp_calib.judgement import FEW_VIEWS, RANGE_SPREAD
 from opencsp_calib.pose import Pose
 from opencsp_calib.quality import held, range_of
 
-__all__ = ["REGIONS", "TILT_ALLOWED_DEG", "Lack", "lacks"]
+__all__ = ["REGIONS", "TILT_ALLOWED_DEG", "Lack", "lacks", "more_views"]
 
 TILT_ALLOWED_DEG = (25.0, 50.0)  # 30 to 45 are asked for; a person does not hold a board to a degree
 REACH = 0.2  # of the image's width and height: corners of the board this near to an edge reach it
@@ -64,7 +64,12 @@ def lacks(observations: Observations, poses: Sequence[Pose]) -> tuple[Lack, ...]
 def _views(count: int) -> Lack | None:
     if count >= FEW_VIEWS:
         return None
-    return Lack("views", f"{FEW_VIEWS - count} more views at least", _no_view_by_itself)
+    return Lack("views", f"{more_views(FEW_VIEWS - count)} at least", _no_view_by_itself)
+
+
+def more_views(count: int) -> str:
+    """So many more views, in words."""
+    return f"{count} more {'view' if count == 1 else 'views'}"
 
 
 def _tilt(poses: Sequence[Pose]) -> Lack | None:
