@@ -73,7 +73,7 @@ class Bouguet(FileFormat):
 
 def _joined(text: str) -> str:
     """Lines that ``...`` continues, as one."""
-    return re.sub(r"\.\.\.[^\n]*\n", " ", text)
+    return re.sub(r"\.\.\.[^\n]*(?:\n|\Z)", " ", text)
 
 
 def _assigned(text: str) -> dict[str, Any]:

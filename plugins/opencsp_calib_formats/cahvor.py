@@ -42,7 +42,7 @@ class Cahvor(FileFormat):
     def recognises(self, path: Path) -> bool:
         """See `CameraFormat.recognises`."""
         text = head(path)
-        return all(re.search(rf"^\s*{key}\s*=", text, re.MULTILINE) for key in ("Dimensions", "C", "A", "H", "V"))
+        return all(re.search(rf"^[ \t]*{key}[ \t]*=", text, re.MULTILINE) for key in ("Dimensions", "C", "A", "H", "V"))
 
     def read(self, path: Path) -> Mapping[str, Imported]:
         """See `CameraFormat.read`."""

@@ -30,7 +30,7 @@ from opencsp_calib_formats.safe_text import head, once, read_text
 __all__ = ["Halcon"]
 
 GROUP = re.compile(r"^[ \t]*ParGroup[ \t]*:[ \t]*Cam", re.MULTILINE)
-ENTRY = re.compile(r"^[ \t]*(\w+)[ \t]*:[ \t]*\w*[ \t]*:([^;\n]+);", re.MULTILINE)
+ENTRY = re.compile(r"^[ \t]*(\w+)[ \t]*:[ \t]*(?:\w+[ \t]*)?:([^;\n]+);", re.MULTILINE)
 POLYNOMIAL = ("Poly1", "Poly2", "Poly3", "Poly4", "Poly5")
 OTHER_CAMERAS = ("Magnification", "Tilt", "Rot", "ImagePlaneDist", "Vx", "Vy", "Vz", "SensorType", "HyperFocus")
 LINES_BETWEEN = ("ParGroup", "DOUBLE", "INT", "STRING")

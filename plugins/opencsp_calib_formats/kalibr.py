@@ -54,7 +54,7 @@ class Kalibr(TextFormat):
         """See `CameraFormat.recognises`."""
         text = head(path)
         return bool(
-            re.search(r"^\s*\"?cam\d+\"?\s*:", text, re.MULTILINE)
+            re.search(r"^[ \t]*\"?cam\d+\"?[ \t]*:", text, re.MULTILINE)
             and re.search(r"\bcamera_model\b", text)
             and re.search(r"\bintrinsics\b", text)
         )

@@ -43,7 +43,7 @@ class MrcalCameraModel(TextFormat):
         return bool(
             re.search(rf"['\"]({'|'.join(MODEL_KEYS)})['\"]\s*:\s*b?['\"](LENSMODEL|DISTORTION)_", text)
             and re.search(r"['\"]intrinsics['\"]\s*:", text)
-            and re.match(r"(\s|#[^\n]*)*\{", text)
+            and re.match(r"(?:\s|#[^\n]*\n)*\{", text)
         )
 
     def read(self, path: Path) -> Mapping[str, Imported]:

@@ -148,3 +148,19 @@ def test_claims_and_heaps_of_cameras_cost_little(name: str, data: bytes, tmp_pat
     path.write_bytes(data)
     with at_most(10), pytest.raises(CalibError):
         format_of(name).read(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("cahvor", b"\n" * 60_000),
+        ("kalibr", b"\n" * 60_000),
+        ("bouguet", b"." * 60_000),
+        ("halcon", b"ParGroup: Cam;\nFocus:" + b" " * 60_000),
+        ("mrcal", b"#" * 60 + b"\n'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': "),
+    ],
+)
+def test_long_runs_of_one_character_cost_little(name: str, data: bytes, tmp_path: Path) -> None:
+    """Where a pattern could try each of their parts again from each of their characters."""
+    with at_most(2):
+        try_to_read(format_of(name), tmp_path / "file", data)
