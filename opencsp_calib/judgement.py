@@ -17,6 +17,7 @@ from opencsp_calib.quality import SetQuality, ViewQuality, set_quality, view_qua
 
 __all__ = ["FEW_VIEWS", "RANGE_SPREAD", "REMARKS", "Verdict", "conclusion", "fold_inside", "judge", "verdict"]
 
+MOST_NAMED = 5  # of the worst views, in one warning
 RMS_LIMIT_PX = 1.0  # the seed: an rms over this is a poor calibration
 HEAD_ON_DEG = 10.0  # foreshortening 1.5 %: below this, focal length and range can be exchanged for each other
 PARALLEL_DEG = 10.0  # parallel planes share one vanishing line: two equations for fx, fy, cx, cy (Zhang 2000)
@@ -49,7 +50,7 @@ def judge(calibration: Calibration) -> tuple[Problem, ...]:
     whole = set_quality(calibration, views)
     found = [
         _poor_rms(calibration),
-        *(_poor_view(view) for view in views),
+        _poor_views(views),
         _few_views(whole),
         _head_on(whole),
         _parallel(calibration, whole),
@@ -93,10 +94,14 @@ def _poor_rms(calibration: Calibration) -> Problem | None:
     return Problem("poor-rms", message)
 
 
-def _poor_view(view: ViewQuality) -> Problem | None:
-    if not view.rms_px > RMS_LIMIT_PX:
+def _poor_views(views: tuple[ViewQuality, ...]) -> Problem | None:
+    poor = sorted((view for view in views if view.rms_px > RMS_LIMIT_PX), key=lambda view: -view.rms_px)
+    if not poor:
         return None
-    message = f"{view.image} has an rms of {view.rms_px:.2f} px, over {RMS_LIMIT_PX:.1f} px: discard it or retake it"
+    named = ", ".join(f"{view.image} ({view.rms_px:.2f} px)" for view in poor[:MOST_NAMED])
+    more = f" and {len(poor) - MOST_NAMED} more" if len(poor) > MOST_NAMED else ""
+    verb, them = ("has", "it") if len(poor) == 1 else ("have", "them")
+    message = f"{named}{more} {verb} an rms over {RMS_LIMIT_PX:.1f} px: discard {them} or retake {them}"
     return Problem("poor-view", message)
 
 

@@ -82,6 +82,10 @@ def test_views_at_one_range_and_small_ones_are_said() -> None:
 def test_a_large_rms_names_the_views() -> None:
     bad = result(WORLD.poses, noise_px=1.2)
     assert {"poor-rms", "poor-view"} <= codes(bad)
+    (poor,) = (problem.message for problem in judge(bad) if problem.code == "poor-view")
+    worst = np.argsort(-bad.view_rms_px)
+    assert poor.startswith(bad.observations.used[worst[0]].image)
+    assert f" and {(bad.view_rms_px > 1).sum() - 5} more have an rms over 1.0 px" in poor
     assert verdict(bad).level == "bad"
     assert "a lens model with distortion" not in verdict(bad).sentence
     pinhole = Camera("c", "pinhole", WORLD.camera.params[:4] * 1.01, WORLD.camera.image_size)
