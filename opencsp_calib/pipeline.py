@@ -117,7 +117,8 @@ def detect(
     files = find_images(images)
     finder = registry.detector(detector) if isinstance(detector, str) else detector or registry.detector_for(board)
     if not finder.supports(board):
-        raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}")
+        able = sorted(name for name, one in registry.detectors.items() if one.supports(board))
+        raise InputError(f"the detector {finder.name!r} cannot look for a {board.kind}; able are: {', '.join(able)}")
     search = Search(board, finder, refine or ("model" if finder.feature == "corner" else "none"))
     return look_at(files, search, jobs, progress, stop, journal, scheduler)
 

@@ -206,6 +206,8 @@ def test_wrong_use(photographs: Path, camera_file: Path, capsys: pytest.CaptureF
     assert "means --no-robust; leave out --robust" in complaint(capsys, *base, "--preset", "opencsp", "--robust")
     assert "KEY=VALUE" in complaint(capsys, *base, "--note", "f8")
     assert "free, square or a number" in complaint(capsys, *base, "--pixel-aspect", "round")
+    assert "able are: checkerboard, opencsp" in complaint(capsys, *base, "--detector", "charuco")
+    assert "'--weights': 'heavy' is not one of" in complaint(capsys, *base, "--weights", "heavy")
     assert "no such file" in complaint(capsys, "validate", "none")
     assert "leave out --board" in complaint(capsys, "validate", camera_file, "--board", SmallWorld.spec)
     assert "installed are: bundle" in complaint(capsys, "validate", camera_file, "--solvers", ",")

@@ -94,7 +94,7 @@ def run(arguments: list[str]) -> int:
 
 def _wrong_use(error: Any) -> str:
     """What the argument parser complains of, what to write where something is missing, and where to read more."""
-    message = error.format_message().rstrip(".")
+    message = error.format_message().rstrip(".").replace(": Value error, ", ": ")  # newer parsers' words for theirs
     wanted = getattr(getattr(error, "param", None), "help", None)
     if type(error).__name__ == "MissingParameter" and wanted:
         message += f": {wanted.rstrip('.')}"
