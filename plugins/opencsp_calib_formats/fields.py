@@ -12,7 +12,7 @@ from opencsp_calib_formats.safe_text import Repeated
 
 __all__ = ["Fields", "matrix", "number", "numbers", "whole"]
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eEdD][+-]?\d+)?")
 MAX_NUMBERS = 2_000_000
 MAX_SIDE = 1_000_000  # pixels, as in Camera
 MAX_NUMBER = 1e100  # beyond it polynomials overflow

@@ -158,6 +158,7 @@ def test_claims_and_heaps_of_cameras_cost_little(name: str, data: bytes, tmp_pat
         ("bouguet", b"." * 60_000),
         ("halcon", b"ParGroup: Cam;\nFocus:" + b" " * 60_000),
         ("mrcal", b"#" * 60 + b"\n'lensmodel': 'LENSMODEL_PINHOLE', 'intrinsics': "),
+        ("tsai", b"fv = 1\ncu = 1\ncv = 1\nfu = " + b"0" * 60_000 + b" 1\n"),
     ],
 )
 def test_long_runs_of_one_character_cost_little(name: str, data: bytes, tmp_path: Path) -> None:
