@@ -1,6 +1,8 @@
 """The tab Capture: the live picture with corners and the next view drawn in it, gauges, and the shutter."""
 
+import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
@@ -46,7 +48,10 @@ def build(page: "Page") -> Callable[[], None]:
 
 
 def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
+    from opencsp_calib.coach.knowledge import GOAL_PX
+
     asked = {"source": "basler", "device": "", "release": "coach", "count": "50", "folder": "photographs", "set": ""}
+    asked |= {"goal": f"{GOAL_PX:g}", "range": ""}
 
     def take(name: str) -> Callable[[str], None]:
         return lambda value: asked.update({name: value})
@@ -58,7 +63,10 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
     async def start() -> None:
         try:
             folder = within(page.session.folder, asked["folder"])
+            device = _device(page.session.folder, asked["device"])
             count = _number(asked["count"])
+            goal_px = _positive(asked["goal"], "goal", "0.1")
+            range_m = _positive(asked["range"], "working distance", "5") if asked["range"].strip() else None
         except InputError as error:
             page.session.say(str(error), "bad")
             return
@@ -66,9 +74,11 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
             folder=str(folder),
             board=page.session.board,
             source=asked["source"],
-            device=asked["device"] or None,
+            device=device or None,
             release=asked["release"],
             count=count,
+            range_m=range_m,
+            goal_px=goal_px,
             settings=[line.strip() for line in asked["set"].splitlines() if line.strip()],
         )
 
@@ -85,6 +95,9 @@ def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
         field("Photographs go to the folder", asked["folder"], take("folder"), "capture-folder")
         choice("Release", RELEASES, asked["release"], take("release")).props("data-testid=capture-release")
         field("Photographs in all", asked["count"], take("count"), "capture-count")
+        with ui.element("div").classes("side-by-side"):
+            field("Goal in px", asked["goal"], take("goal"), "capture-goal")
+            field("Distance in m", "", take("range"), "capture-range", "far")
         settings = ui.textarea("Camera settings", on_change=lambda e: asked.update(set=e.value)).classes("field")
         settings.props('outlined dense autogrow data-testid=capture-settings placeholder="FEATURE=VALUE, one a line"')
         begin = action("Start", start, "capture-start")
@@ -120,6 +133,22 @@ async def _calibrate(page: "Page", folder: str) -> None:
 
     if await may_forget(page.session):
         page.attempt(go_on)
+
+
+def _device(folder: Path, text: str) -> str:
+    """A camera's serial number as it is; a folder only below DIR, its whole path."""
+    is_folder = (folder / Path(text.strip()).expanduser()).is_dir()
+    return str(within(folder, text)) if text.strip() and is_folder else text.strip()
+
+
+def _positive(text: str, what: str, such_as: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 < value < math.inf:
+        raise InputError(f"the {what} must be a positive number, such as {such_as}, not {text!r}")
+    return value
 
 
 def _number(text: str) -> int:

@@ -83,6 +83,17 @@ def test_from_the_live_picture_straight_to_a_calibration(window: Window, scene: 
 def test_a_camera_that_is_not_there_is_one_sentence(window: Window) -> None:
     window.describe("captured", 9, 6, 30)
     open_tab(window)
+    for name, wrong, words in (
+        ("capture-device", "/", "outside of"),
+        ("capture-goal", "none", "goal must be a positive number"),
+        ("capture-range", "-1", "working distance must be a positive number"),
+    ):
+        right = window.element(name).get_attribute("value")
+        window.type(name, wrong)
+        window.until(lambda: window.enabled("capture-start"))
+        window.click("capture-start")
+        window.until(lambda words=words: words in window.status)
+        window.type(name, right)
     window.type("capture-device", "4711")
     window.until(lambda: window.enabled("capture-start"))
     window.click("capture-start")
