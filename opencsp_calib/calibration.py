@@ -1,6 +1,6 @@
 """The result: a camera, and everything that says how far to trust it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, TypeAlias
@@ -74,11 +74,10 @@ class Calibration:
         detections = self.observations.detections
         if len(self.cam_from_board) != len(detections):
             raise InputError(f"{len(self.cam_from_board)} poses do not fit {len(detections)} used views")
-        if self.residuals is None:
-            object.__setattr__(self, "residuals", self._computed_residuals())
         if self.outliers is None:
             object.__setattr__(self, "outliers", tuple(np.zeros(len(d), dtype=bool) for d in detections))
-        pairs = zip(self.residuals, self.outliers, detections, strict=True)
+        residuals = self._computed_residuals() if self.residuals is None else self.residuals
+        pairs = zip(residuals, self.outliers, detections, strict=True)
         frozen_pairs = [
             (frozen(r, "residuals", (len(d), 2), finite=False), frozen_mask(o, "outliers", (len(d),)))
             for r, o, d in pairs
@@ -128,12 +127,10 @@ class Calibration:
         """The same result with more to say."""
         return replace(self, problems=self.problems + problems)
 
-    def _computed_residuals(self) -> tuple[Floats, ...]:
+    def _computed_residuals(self) -> Iterator[Floats]:
         turns = rotation_matrices(np.array([pose.rotation for pose in self.cam_from_board]).reshape(-1, 3))
-        return tuple(
-            self.camera.project(self.board.points[d.ids] @ turn.T + pose.translation) - d.pixels
-            for turn, pose, d in zip(turns, self.cam_from_board, self.observations.detections, strict=True)
-        )
+        for turn, pose, d in zip(turns, self.cam_from_board, self.observations.detections, strict=True):
+            yield self.camera.project(self.board.points[d.ids] @ turn.T + pose.translation) - d.pixels
 
 
 Solve: TypeAlias = Callable[[Observations], Calibration]
