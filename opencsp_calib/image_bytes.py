@@ -11,6 +11,7 @@ __all__ = ["fault"]
 CUT_SHORT = "is cut short; copy it again from the camera"
 DAMAGED = "is damaged, since a checksum in it is wrong; copy it again from the camera"
 MOST_PAGES = 1000
+MOST_ENTRIES = 500  # of a page; real ones have some twenty, and damaged ones would take minutes
 
 
 def fault(data: bytes) -> str:
@@ -52,6 +53,8 @@ def _tiff_pages(data: bytes) -> int:
         while at and at not in seen and len(seen) < MOST_PAGES:
             seen.add(at)
             (count,) = struct.unpack_from(order + "H", data, at)
+            if count > MOST_ENTRIES:
+                break
             entries = [struct.unpack_from(order + "HHII", data, at + 2 + 12 * index) for index in range(count)]
             kind = next((value for tag, _, _, value in entries if tag == 254), 0)
             pages += not kind & 1  # bit 0: a reduced copy of another page

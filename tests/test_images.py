@@ -120,6 +120,20 @@ def test_of_several_pages_none_is_taken_silently(tmp_path: Path) -> None:
         read(tmp_path / "two.tif")
 
 
+def test_pages_that_lie_in_one_another_are_not_counted_for_minutes(tmp_path: Path) -> None:
+    entries, pages = 65_535, 1000
+    data = bytearray(8 + 12 * (entries + pages) + 8)
+    data[:8] = b"II*\0" + struct.pack("<I", 8)
+    for page in range(pages):
+        at = 8 + 12 * page
+        struct.pack_into("<H", data, at, entries)
+        struct.pack_into("<I", data, at + 2 + 12 * entries, at + 12)
+    path = tmp_path / "endless.tif"
+    path.write_bytes(data)
+    with pytest.raises(InputError, match=r"endless\.tif cannot be read as an image"):
+        read(path)
+
+
 def test_a_preview_in_a_tiff_is_no_page(tmp_path: Path) -> None:
     path = tmp_path / "previewed.tif"
     cv2.imwritemulti(str(path), [np.full((20, 30), 7, np.uint8), np.zeros((5, 5), np.uint8)])
