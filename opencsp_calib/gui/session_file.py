@@ -13,6 +13,7 @@
 """
 
 import json
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from opencsp_calib.atomic import replacing
@@ -59,6 +60,8 @@ def read_session(session: "Session") -> None:
         return
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
+        if content["version"] != VERSION:
+            raise InputError(f"it is of version {content['version']}, and this program knows version {VERSION}")
         session.settings = Settings.from_json(content["settings"])
         session.selection.sources = tuple(str(source) for source in content["sources"])
         session.kept = str(content["kept"])
@@ -68,7 +71,11 @@ def read_session(session: "Session") -> None:
         _read_results(session)
         session.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
     except (InputError, OSError, ValueError, KeyError, TypeError) as error:
-        session.message = Message(f"The session kept in {shown(session.folder, path)} cannot be read: {error}", "bad")
+        aside = path.with_name("session-not-read.json")  # or the next change would write over it
+        with suppress(OSError):
+            path.replace(aside)
+        text = f"The session kept in {shown(session.folder, path)} cannot be read: {error}. A new one begins"
+        session.message = Message(f"{text}; the other is kept as {aside.name}.", "bad")
 
 
 def _read_results(session: "Session") -> None:
