@@ -54,6 +54,12 @@ def test_the_whole_procedure(window: Window, data_dir: Path, tmp_path: Path) -> 
     window.tab("Poses")
     window.until(lambda: len(window.find_all(".space g.board")) == 10 + 1)
     window.picture("8-poses")
+    window.tab("Board shape")
+    window.until(lambda: window.find_all('img[alt="heights and deviations of the board\'s corners"]'))
+    window.picture("8-board-shape")
+    window.tab("Uncertainty")
+    window.until(lambda: window.find_all("img[alt='influence of each view']"))
+    window.picture("8-uncertainty")
     rights = "return [...document.querySelectorAll('main, main *')].map((one) => one.getBoundingClientRect().right)"
     assert max(window.browser.execute_script(rights)) <= window.browser.execute_script("return innerWidth")
     rows = window.rows("worst-images")
