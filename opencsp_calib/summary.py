@@ -91,9 +91,9 @@ def parameter_lines(
 
 def _in_millimetres(camera: Camera, record: Mapping[str, str]) -> list[tuple[str, str, str]]:
     """To be held against the lens's label; the principal point from the middle of the sensor."""
-    if PIXEL_PITCH not in record:
+    pitch_mm = _pixel_pitch_mm(record)
+    if pitch_mm is None:
         return []
-    pitch_mm = float(record[PIXEL_PITCH]) * 1e-3
     fx, fy, cx, cy = camera.params[:4]
     middle_x, middle_y = ((side - 1) / 2 for side in camera.image_size)
     values = {
@@ -103,6 +103,15 @@ def _in_millimetres(camera: Camera, record: Mapping[str, str]) -> list[tuple[str
         "principal point y from the middle": (cy - middle_y) * pitch_mm,
     }
     return [(name, f"{value:.4f} mm", "") for name, value in values.items()]
+
+
+def _pixel_pitch_mm(record: Mapping[str, str]) -> float | None:
+    """None where it is not known; a record may come from anybody's file, or be a note that somebody typed."""
+    try:
+        pitch_mm = float(record.get(PIXEL_PITCH, "")) * 1e-3
+    except ValueError:
+        return None
+    return pitch_mm if math.isfinite(pitch_mm) and pitch_mm > 0 else None
 
 
 def view_as_json(view: View, quality: ViewQuality | None = None) -> dict[str, Any]:
