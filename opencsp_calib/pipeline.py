@@ -150,7 +150,7 @@ def solve(
         'auto' decides from the data and says so, where the solver is able to solve for the shape.
     pixel_aspect : 'free', 'square' or float, optional
         Whether fx and fy are independent, equal, or in the ratio fy/fx. By default free, but square where the board's
-        shape is free and all views hold it the same way up, because then the two cannot be told apart.
+        shape is solved for and all views hold it the same way up, because then the two cannot be told apart.
     weights : 'equal' or 'covariance', optional
     robust : bool, optional
         These two by default by covariance and robust with `DEFAULT_SOLVER`, which can do both with any corners and any

@@ -10,6 +10,7 @@ pytest.importorskip("nicegui")
 
 from opencsp_calib.gui.session import Session
 from opencsp_calib.gui.session_file import write_session
+from opencsp_calib.gui.settings import Settings
 
 
 def kept(folder: Path) -> Path:
@@ -37,5 +38,16 @@ def test_what_cannot_be_read_is_said_and_kept(tmp_path: Path, damage: str) -> No
     again = Session(tmp_path)
     assert "session.json cannot be read" in again.message.text
     assert again.message.level == "bad"
+    assert again.settings == Settings()
     write_session(again)
     assert path.with_name("session-not-read.json").read_text() == damage
+
+
+def test_a_result_that_is_damaged_takes_nothing_else_along(tmp_path: Path) -> None:
+    path = kept(tmp_path)
+    (path.parent / "calibration.hdf5").write_bytes(b"damaged")
+    again = Session(tmp_path)
+    assert again.settings.camera_name == "west"
+    assert "calibration.hdf5" in again.message.text
+    assert (again.message.level, again.calibration) == ("bad", None)
+    assert path.exists()

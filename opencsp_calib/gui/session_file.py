@@ -14,7 +14,7 @@
 
 import json
 from contextlib import suppress
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from opencsp_calib.atomic import replacing
 from opencsp_calib.errors import InputError
@@ -59,23 +59,32 @@ def read_session(session: "Session") -> None:
     if not path.is_file():
         return
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-        if content["version"] != VERSION:
-            raise InputError(f"it is of version {content['version']}, and this program knows version {VERSION}")
-        session.settings = Settings.from_json(content["settings"])
-        session.selection.sources = tuple(str(source) for source in content["sources"])
-        session.kept = str(content["kept"])
-        session.found_with, session.solved_with = content["found_with"], content["solved_with"]
-        session.removed = frozenset(str(name) for name in content["removed"])
-        wrong = session.selection.look_up()
-        _read_results(session)
-        session.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
+        wrong = _take(session, json.loads(path.read_text(encoding="utf-8")))
     except (InputError, OSError, ValueError, KeyError, TypeError) as error:
         aside = path.with_name("session-not-read.json")  # or the next change would write over it
         with suppress(OSError):
             path.replace(aside)
         text = f"The session kept in {shown(session.folder, path)} cannot be read: {error}. A new one begins"
         session.message = Message(f"{text}; the other is kept as {aside.name}.", "bad")
+        return
+    try:
+        _read_results(session)
+    except (InputError, OSError) as error:
+        wrong = (*wrong, f"What was found cannot be read: {error}")
+    session.message = Message("; ".join(("Going on from where you left.", *wrong)), "bad" if wrong else "info")
+
+
+def _take(session: "Session", content: Any) -> tuple[str, ...]:
+    """Take all of it, or nothing; what is wrong with the photographs."""
+    if content["version"] != VERSION:
+        raise InputError(f"it is of version {content['version']}, and this program knows version {VERSION}")
+    settings = Settings.from_json(content["settings"])
+    sources, removed = (tuple(map(str, content[name])) for name in ("sources", "removed"))
+    kept, found_with, solved_with = str(content["kept"]), content["found_with"], content["solved_with"]
+    session.settings, session.kept, session.removed = settings, kept, frozenset(removed)
+    session.found_with, session.solved_with = found_with, solved_with
+    session.selection.sources = sources
+    return session.selection.look_up()
 
 
 def _read_results(session: "Session") -> None:
