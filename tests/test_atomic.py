@@ -17,6 +17,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell that started
 written = h5py.Group.create_dataset
 
 def stopped(self, name, *args, **options):
+    h5py.Group.create_dataset = written  # asked once: a second time is for those who do not want to wait for us
     signal.raise_signal(signal.SIGINT)  # as Ctrl-C does: Python's handler runs in the main thread, which waits for this
     return written(self, name, *args, **options)
 
