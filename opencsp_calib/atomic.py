@@ -3,7 +3,6 @@
 import contextlib
 import os
 import stat
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ __all__ = ["check_writable", "replacing"]
 
 MAX_NAME = 255  # bytes of a file's name, on nearly every file system
 MAX_SUFFIX = 32
+NEW, PRIVATE = 0o666, 0o600  # permissions, of which the umask takes some away
 
 
 def check_writable(path: str | os.PathLike[str]) -> Path:
@@ -79,17 +79,17 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
         If the folder does not exist, is not writable, or the disk is full.
     """
     path = check_writable(path)
+    mode = _permissions(path)
+    suffix = path.suffix if len(path.suffix) < MAX_SUFFIX else ""
+    temporary = path.with_name(f".writing-{os.urandom(8).hex()}{suffix}")
     try:
-        suffix = path.suffix if len(path.suffix) < MAX_SUFFIX else ""
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=".writing-", suffix=suffix)
-        os.close(handle)
-    except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror}") from None
-    temporary = Path(name)
-    try:
+        # a new one as any new file, which the system sees to: asking for the process's umask means to change it for a
+        # moment, in which other threads make files that are open to everybody
+        temporary.touch(NEW if mode is None else PRIVATE, exist_ok=False)
         yield temporary
         _flush(temporary)
-        _take_permissions(temporary, path)
+        if mode is not None:
+            os.chmod(temporary, mode)
         os.replace(temporary, path)
         _flush_folder(path.parent)
     except OSError as error:
@@ -97,6 +97,12 @@ def replacing(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with contextlib.suppress(FileNotFoundError):
             temporary.unlink()
+
+
+def _permissions(path: Path) -> int | None:
+    with contextlib.suppress(FileNotFoundError):
+        return path.stat().st_mode & 0o777
+    return None
 
 
 def _flush(path: Path) -> None:
@@ -115,14 +121,3 @@ def _flush_folder(folder: Path) -> None:
             os.fsync(handle)
         finally:
             os.close(handle)
-
-
-def _take_permissions(temporary: Path, path: Path) -> None:
-    """Those of the file to be replaced, else those any new file gets: mkstemp's are for the owner only."""
-    if path.exists():
-        mode = path.stat().st_mode & 0o777
-    else:
-        mask = os.umask(0)
-        os.umask(mask)
-        mode = 0o666 & ~mask
-    os.chmod(temporary, mode)

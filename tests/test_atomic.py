@@ -1,5 +1,7 @@
 """A file is there whole or not at all, whatever happens while it is written."""
 
+import os
+import stat
 import subprocess
 import sys
 from pathlib import Path
@@ -40,6 +42,29 @@ def test_what_stood_there_stays_when_writing_is_stopped(error: type[BaseExceptio
     with pytest.raises(error):
         write_half()
     assert [p.read_text() for p in tmp_path.iterdir()] == ["before"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="has no such permissions")
+def test_permissions_are_those_of_any_new_file_or_of_the_one_before(tmp_path: Path, monkeypatch) -> None:
+    """The umask is the whole process's: changed even for a moment, it is so for files that other threads make."""
+
+    def written(name: str) -> list[int]:
+        path = tmp_path / name
+        with replacing(path) as temporary:
+            meanwhile = stat.S_IMODE(temporary.stat().st_mode)
+        return [meanwhile, stat.S_IMODE(path.stat().st_mode)]
+
+    (tmp_path / "private").touch(0o600)
+    (tmp_path / "shared").touch()
+    (tmp_path / "shared").chmod(0o664)
+    before = os.umask(0o027)
+    try:
+        monkeypatch.setattr(os, "umask", None)
+        found = [written(name) for name in ("new", "private", "shared")]
+        monkeypatch.undo()
+    finally:
+        os.umask(before)
+    assert found == [[0o640, 0o640], [0o600, 0o600], [0o600, 0o664]]
 
 
 def test_control_c_in_the_middle_of_saving_leaves_nothing_and_says_so(tmp_path: Path) -> None:
