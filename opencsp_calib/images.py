@@ -110,6 +110,8 @@ def as_text(name: str) -> str:
 
 
 def _expanded(text: str) -> list[Path]:
+    if not text:  # which would be the current folder
+        raise InputError("the name of an image or folder is empty; the current folder is called .")
     path = Path(text)
     if len(path.name) > MAX_NAME:
         raise InputError(f"no such file or folder: {text[:60]}... (the name is too long for a file)")

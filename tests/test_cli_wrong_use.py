@@ -88,6 +88,24 @@ def test_columns_and_rows_swapped_are_the_same_board_turned(photographs: Path, c
     np.testing.assert_allclose(values[0], values[1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("fleet", "", "--board", SmallWorld.spec),
+        ("calibrate", "", "--board", SmallWorld.spec),
+        ("calibrate", ".", "--board", SmallWorld.spec, "--output="),
+        ("gui", ""),
+        ("show", " "),
+        ("demo", ""),
+    ],
+)
+def test_an_empty_path_is_not_the_current_folder(command: tuple[str, ...], tmp_path: Path, monkeypatch, capsys) -> None:
+    monkeypatch.chdir(tmp_path)
+    place = "--output" if "--output=" in command else command[0]
+    assert f"nothing is given after {place}, only an empty text" in complaint(capsys, *command)
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_observations_file_is_not_named_as_something_else(tmp_path: Path, capsys) -> None:
     said = complaint(capsys, "detect", tmp_path, "--board", SmallWorld.spec, "-o", tmp_path / "seen.csv")
     assert "seen.csv would be HDF5 under another name: let its name end in .h5" in said

@@ -83,7 +83,13 @@ def test_globs_files_and_folders_have_unique_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("given", "message"), [("none.png", "no such file"), ("*.jpg", "no file matches"), (".", "has no image files")]
+    ("given", "message"),
+    [
+        ("none.png", "no such file"),
+        ("*.jpg", "no file matches"),
+        (".", "has no image files"),
+        ("", r"is empty; the current folder is called \."),
+    ],
 )
 def test_nothing_found_says_what(given: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

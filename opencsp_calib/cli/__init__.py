@@ -6,6 +6,7 @@ to standard error; ``--json`` puts one JSON object, and nothing else, on standar
 
 import gc
 import os
+import re
 import sys
 import warnings
 from typing import Any
@@ -17,11 +18,12 @@ from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.help import CommandWithSections, first_line
 from opencsp_calib.cli.setting_up import print_versions
 from opencsp_calib.cli.stopping import stop_when_told, was_told
-from opencsp_calib.errors import CalibError
+from opencsp_calib.errors import CalibError, InputError
 
 __all__ = ["app", "main"]
 
 INTERRUPTED = 130  # what the argument parser returns for KeyboardInterrupt
+NOTHING = re.compile(r"(--[\w-]+=)?\s*")  # as an argument
 
 app = typer.Typer(
     name="opencsp-calib",
@@ -63,6 +65,7 @@ def run(arguments: list[str]) -> int:
     """Run one command, and give its exit code."""
     warnings.showwarning = lambda message, *_: say(f"warning: {message}")  # one line, without our source code
     try:
+        _check_given(arguments)
         outcome = app(arguments, prog_name="opencsp-calib", standalone_mode=False)
     except CalibError as error:
         complain(str(error))
@@ -90,6 +93,14 @@ def run(arguments: list[str]) -> int:
         complain("stopped; what was not finished was not written")
         return 1
     return outcome if isinstance(outcome, int) else 0
+
+
+def _check_given(arguments: list[str]) -> None:
+    """Refuse an empty argument: to Python an empty path is the current folder, which nobody has named."""
+    for before, argument in zip(["opencsp-calib", *arguments], arguments, strict=False):
+        if NOTHING.fullmatch(argument):
+            place = argument.rstrip(" =") or before
+            raise InputError(f"nothing is given after {place}, only an empty text: a variable without a value, perhaps")
 
 
 def _wrong_use(error: Any) -> str:
