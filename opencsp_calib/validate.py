@@ -137,11 +137,11 @@ def _tried(
 
 def _of_solvers(pairs: Sequence[Pair]) -> tuple[str, ...]:
     if not pairs:
-        return ("fewer than two solvers could run: there was nothing to compare; install or name another",)
+        return ("install another solver, or name one, to compare with",)
     apart = [pair for pair in pairs if not pair.agree]
     if not apart:
         worst = max(pair.difference.worst_px for pair in pairs)
-        return (f"the solvers agree: they differ nowhere in the image by more than {worst:.1g} px",)
+        return (f"solvers differ nowhere in the image by more than {worst:.1g} px",)
     return tuple(
         f"{pair.a} and {pair.b} differ by up to {pair.difference.worst_px:.2g} px in the image, more than {AGREE_PX:g}"
         for pair in apart

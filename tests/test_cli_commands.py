@@ -45,7 +45,9 @@ def test_validate_lets_solvers_answer_without_images(camera_file: Path, tmp_path
     assert printed["differences"][0]["worst_px"] < 1e-4
     assert printed["halves"]["worst_px"] > 0
     assert printed["verdict"] == "agree"
-    assert "The solvers agree" in report.read_text(encoding="utf-8")
+    page = report.read_text(encoding="utf-8")
+    assert "The solvers agree." in page
+    assert page.lower().count("solvers agree") == 1
 
 
 def test_check_tells_a_good_camera_from_a_bad_one(
