@@ -24,7 +24,7 @@ from opencsp_calib.registry import installed
 if TYPE_CHECKING:
     from distributed import Client
 
-__all__ = ["Cluster", "Scheduler", "connected"]
+__all__ = ["Cluster", "Scheduler", "client_of", "connected"]
 
 Scheduler: TypeAlias = "str | Client"
 Kind: TypeAlias = "tuple[Board, str, Refine, dict[str, str]]"
@@ -110,10 +110,28 @@ def connected(scheduler: Scheduler, search: Search, ended: threading.Event) -> I
     Parameters
     ----------
     scheduler : str or distributed.Client
-        An address such as ``tcp://10.0.0.5:8786``, or a client. Certificates for ``tls://`` come from Dask's own
-        configuration.
+        See `client_of`.
     search : Search
     ended : threading.Event
+
+    Raises
+    ------
+    InputError, MissingDependencyError
+        See `client_of`.
+    """
+    with client_of(scheduler) as client:
+        yield Cluster(client, search, ended)
+
+
+@contextmanager
+def client_of(scheduler: Scheduler) -> "Iterator[Client]":
+    """A client of a scheduler that has workers; it is closed in the end, unless it was given.
+
+    Parameters
+    ----------
+    scheduler : str or distributed.Client
+        An address such as ``tcp://10.0.0.5:8786``, or a client. Certificates for ``tls://`` come from Dask's own
+        configuration.
 
     Raises
     ------
@@ -129,7 +147,7 @@ def connected(scheduler: Scheduler, search: Search, ended: threading.Event) -> I
         raise MissingDependencyError(f"Dask cannot be used ({error}); pip install 'opencsp-calib[dask]'") from None
     with dask.config.set({"distributed.admin.large-graph-warning-threshold": LARGEST_MESSAGE}):
         if not isinstance(scheduler, str):
-            yield Cluster(scheduler, search, ended)
+            yield scheduler
             return
         client: Any = None
         try:
@@ -139,7 +157,7 @@ def connected(scheduler: Scheduler, search: Search, ended: threading.Event) -> I
             _close(client)
             raise InputError(f"cannot use the Dask scheduler {scheduler!r}: {_first_line(error)}") from None
         try:
-            yield Cluster(client, search, ended)
+            yield client
         finally:
             _close(client)
 

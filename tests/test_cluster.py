@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from command_line import answer
 from observed import assert_same
 from worlds import SmallWorld
 
@@ -175,6 +177,26 @@ def test_a_scheduler_that_is_not_there(
     said = capsys.readouterr().err.strip().splitlines()
     assert said[-1].startswith(f"error: cannot use the Dask scheduler '{address}'")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_fleet_without_its_scheduler_is_not_begun(tmp_path: Path, capsys) -> None:
+    """One line for the address, not a failure for every camera."""
+    for name in ("north", "south"):
+        (tmp_path / "cameras" / name).mkdir(parents=True)
+        (tmp_path / "cameras" / name / "1.png").write_bytes(b"never read")
+    command = ["fleet", str(tmp_path / "cameras"), "--board", SmallWorld.spec, "-o", str(tmp_path / "results")]
+    assert run([*command, "--scheduler", "nonsense"]) == 2
+    assert capsys.readouterr().err.startswith("error: cannot use the Dask scheduler 'nonsense'")
+    assert [path.name for path in tmp_path.iterdir()] == ["cameras"]
+
+
+def test_a_fleet_on_a_cluster(photographs: Path, tmp_path: Path, capsys) -> None:
+    for name in ("north", "south"):
+        shutil.copytree(photographs, tmp_path / "cameras" / name)
+    with in_this_process() as client:
+        at = client.scheduler.address
+        found = answer(capsys, "fleet", tmp_path / "cameras", "--board", SmallWorld.spec, "--scheduler", at)
+    assert [camera["verdict"] for camera in found["cameras"]] == ["good", "good"]
 
 
 def certificates(folder: Path) -> dict[str, str]:

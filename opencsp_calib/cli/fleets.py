@@ -1,6 +1,7 @@
 """The command that calibrates many cameras: fleet."""
 
 import time
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +13,8 @@ from opencsp_calib.cli.solving_options import Model, SolverName
 from opencsp_calib.errors import CancelledError, InputError
 
 if TYPE_CHECKING:
+    from distributed import Client
+
     from opencsp_calib.fleet import FleetResult
     from opencsp_calib.fleet_file import FleetCamera
 
@@ -48,8 +51,9 @@ def fleet(
     cameras = find_fleet(where, args.given(board=board, model=model, solver=solver))
     _check_asked(cameras, board, args.given(model=model, solver=solver))
     root = output or cameras[0].root
-    _make(root)
-    results = _calibrated(cameras, root, resume, jobs, scheduler)
+    with _workers(scheduler) as client:
+        _make(root)
+        results = _calibrated(cameras, root, resume, jobs, client)
     write_fleet(results, root.absolute().name, root / INDEX_FILE)
     _say_results(results)
     say(f"report saved: {root / INDEX_FILE}")
@@ -90,8 +94,17 @@ def _make(root: Path) -> None:
     check_writable(root / INDEX_FILE)
 
 
+def _workers(scheduler: str | None) -> "AbstractContextManager[Client | None]":
+    """One connection for all cameras, so that a wrong address is one mistake, told at once."""
+    if scheduler is None:
+        return nullcontext()
+    from opencsp_calib.cluster import client_of
+
+    return client_of(scheduler)
+
+
 def _calibrated(
-    cameras: "tuple[FleetCamera, ...]", root: Path, resume: bool, jobs: int | None, scheduler: str | None
+    cameras: "tuple[FleetCamera, ...]", root: Path, resume: bool, jobs: int | None, scheduler: "Client | None"
 ) -> "list[FleetResult]":
     """One after another, each with all cores; what was found is kept until all are done."""
     from opencsp_calib.fleet import CAMERA_FILE, calibrate_camera
