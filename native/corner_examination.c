@@ -57,7 +57,7 @@ void examine_quarters(const double *p, const Window *window, double white, doubl
     }
     for (int quarter = 0; quarter < 4; quarter++) {
         double pixels = greater(weight[quarter], 1.0);
-        found[MISFIT + quarter] = misfit[quarter] / (pixels * greater(fabs(p[B]), 1e-9));
+        found[MISFIT + quarter] = misfit[quarter] / (pixels * fabs(p[B]));
         found[SATURATION + quarter] = saturation[quarter] / pixels;
         found[WEIGHT + quarter] = weight[quarter];
     }

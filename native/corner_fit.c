@@ -2,6 +2,7 @@
 
 #include <math.h>
 #include <stddef.h>
+#include <string.h>
 
 #include "corner_kernel.h"
 #include "exported.h"
@@ -24,9 +25,9 @@ static double length(const double *step) { return sqrt(step[AT_X] * step[AT_X] +
 
 /* The fraction of a step within which the model is nearly linear. */
 static double trusted_part(const double *p, const double *step) {
-    double fraction = lesser(1.0, 1.5 / (length(step) + 1e-9));
-    fraction = lesser(fraction, 0.3 / (greater(fabs(step[ANGLE_1]), fabs(step[ANGLE_2])) + 1e-9));
-    return lesser(fraction, 0.6 * p[BLUR] / (fabs(step[BLUR]) + 1e-9));
+    double fraction = lesser(1.0, 1.5 / length(step));
+    fraction = lesser(fraction, 0.3 / greater(fabs(step[ANGLE_1]), fabs(step[ANGLE_2])));
+    return lesser(fraction, 0.6 * p[BLUR] / fabs(step[BLUR]));
 }
 
 /* Go a fraction of a step, which becomes what was gone. */
@@ -66,8 +67,7 @@ static int fit(const Image *image, double *p, const double *bends, const double 
         if (!factorise(normal, factor))
             return FAILED;
         double last_x = step[AT_X], last_y = step[AT_Y];
-        for (int k = 0; k < PARAMETERS; k++)
-            step[k] = normal[PARAMETERS][k];
+        memcpy(step, normal[PARAMETERS], sizeof(step));
         solve(factor, step);
         if (step[AT_X] * last_x + step[AT_Y] * last_y < -MOST_SWING * (last_x * last_x + last_y * last_y))
             calm *= 0.5;

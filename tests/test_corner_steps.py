@@ -92,6 +92,32 @@ def test_a_step_that_makes_it_worse_is_halved(off: dict[str, float], steps: int)
     assert twice - before == pytest.approx((once - before) / 2, rel=1e-4, abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("spot", "off", "swing"),
+    [
+        ((42, 40, 2, 255), {"x": -0.25}, 0.44),  # along the rows
+        ((43, 39, 3, 200), {}, 0.52),
+        ((39, 44, 3, 255), {}, 0.43),  # along the columns
+        ((38, 41, 3, 255), {"y": 0.25}, 0.58),
+        ((40, 39, 2, 255), {"x": -0.25, "y": -0.75}, 0.47),
+        ((40, 39, 2, 255), {"x": 0.5, "y": 0.25}, 0.58),
+    ],
+)
+def test_a_step_that_goes_back_over_half_of_the_last_is_halved(
+    spot: tuple[int, int, int, int], off: dict[str, float], swing: float
+) -> None:
+    """In a small window with a stain, which the window follows."""
+    sharp, half = moved(CENTRED, blur=-0.8), np.array([4.3, 4.1, np.inf, np.inf])
+    row, column, side, level = spot
+    photograph = grey(sharp)
+    photograph[row : row + side, column : column + side] = level
+    start = moved(sharp, **off)
+    (once, _), (twice, _) = (after(photograph, start, steps, half=half) for steps in (1, 2))
+    last, step = once - start, newton(photograph, once, half)
+    assert -(last[:2] @ step[:2]) / (last[:2] @ last[:2]) == pytest.approx(swing, abs=0.01)
+    assert twice - once == pytest.approx(step * (0.5 if swing > 0.5 else 1.0), rel=1e-3, abs=1e-4)
+
+
 def misfit(photograph: Floats, p: Floats) -> float:
     _, _, derivatives, residual = seen(photograph, p, HALF)
     return float(residual @ residual / (derivatives[5] ** 2).sum())
@@ -154,3 +180,12 @@ def test_a_window_may_reach_the_border_of_the_image_and_no_farther(axis: int, en
 def test_what_has_no_second_edge_cannot_be_fitted() -> None:
     flat = np.full((80, 80), 100, np.uint8)
     assert after(flat, UPRIGHT, steps=20)[1] == FAILED
+
+
+def test_a_corner_without_contrast_has_no_step() -> None:
+    """Also where the one before it had: nothing is known of where it is."""
+    starts = np.array([moved(CENTRED, x=0.25), moved(CENTRED, b=-CENTRED[6], b_by_x=-1.0, b_by_y=0.8)])
+    p, bends, windows = starts.copy(), np.tile(BENDS, (2, 1)), np.tile(HALF, (2, 1))
+    found = fit_corners(grey(CENTRED), 255, p, bends, windows, 1e-5, 20, examine=False)
+    assert found[:, 0].tolist() == [CONVERGED, FAILED]
+    assert p[1] == pytest.approx(starts[1], abs=1e-5)
