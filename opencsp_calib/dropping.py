@@ -1,15 +1,43 @@
 """Leaving bad images out: by name, the worst few, or all above an rms; then solving again."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from opencsp_calib.calibration import LEAST_VIEWS, Calibration, Solve
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import InputError
 from opencsp_calib.quality import worst_views
 
-__all__ = ["drop_above", "drop_worst", "excluding"]
+__all__ = ["check_dropping", "drop_above", "drop_worst", "excluding"]
 
 MAX_NAMED = 8  # images in a message
+
+
+def check_dropping(
+    images: Collection[str], exclude: Collection[str], worst: int = 0, select: int | None = None
+) -> None:
+    """Whether so much can be left out of images of these names at all; to be asked before any is looked at.
+
+    Parameters
+    ----------
+    images : collection of str
+        The names of all.
+    exclude : collection of str
+        Those left out by name.
+    worst : int
+        How many more are left out, of the largest rms.
+    select : int, optional
+        How many are kept before that.
+
+    Raises
+    ------
+    InputError
+        If there is no image of such a name, or fewer than `LEAST_VIEWS` would be left.
+    """
+    _check_names(exclude, images)
+    kept = len(set(images) - set(exclude))
+    left = max(min(kept, select or kept) - worst, 0)
+    if left < LEAST_VIEWS and (exclude or worst):
+        raise InputError(f"{left} of {len(images)} images would be left; at least {LEAST_VIEWS} must be left")
 
 
 def excluding(observations: Observations, names: Iterable[str]) -> Observations:
@@ -21,11 +49,7 @@ def excluding(observations: Observations, names: Iterable[str]) -> Observations:
         If there is no image of that name.
     """
     names = list(names)
-    known = sorted(view.image for view in observations.views)
-    for name in names:
-        if name not in known:
-            more = f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
-            raise InputError(f"there is no image {name!r} to exclude; there are {', '.join(known[:MAX_NAMED])}{more}")
+    _check_names(names, [view.image for view in observations.views])
     return observations.dropping(names, Problem("excluded", "left out because you said so"))
 
 
@@ -62,6 +86,14 @@ def drop_above(calibration: Calibration, limit_px: float, solve: Solve) -> Calib
                 "be left: take better photographs, or raise the limit"
             )
         calibration = _without(calibration, above, solve)
+
+
+def _check_names(names: Iterable[str], images: Collection[str]) -> None:
+    known = sorted(images)
+    for name in names:
+        if name not in images:
+            more = f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
+            raise InputError(f"there is no image {name!r} to exclude; there are {', '.join(known[:MAX_NAMED])}{more}")
 
 
 def _without(calibration: Calibration, names: list[str], solve: Solve) -> Calibration:

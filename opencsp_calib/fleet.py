@@ -18,6 +18,7 @@ from opencsp_calib.errors import CalibError, CancelledError, InputError
 from opencsp_calib.fleet_file import FleetCamera
 from opencsp_calib.hdf5 import load_camera
 from opencsp_calib.hdf5_calibration import load_calibration, save_calibration
+from opencsp_calib.images import find_images
 from opencsp_calib.journal import Journal
 from opencsp_calib.summary import PIXEL_PITCH
 
@@ -154,8 +155,9 @@ def _solved(camera: FleetCamera, **how: Any) -> Calibration:
     finding = {key: settings[key] for key in OF_DETECTION if key in settings}
     options = {key.replace("-", "_"): settings[key] for key in OF_SOLVING if key in settings}
     pipeline.check_solving(**options)
-    observations = pipeline.detect(images, board, **finding, **how)
-    observations = dropping.excluding(observations, settings.get("exclude", ()))
+    exclude = settings.get("exclude", ())
+    dropping.check_dropping([file.name for file in find_images(images)], exclude)
+    observations = dropping.excluding(pipeline.detect(images, board, **finding, **how), exclude)
     options |= {"name": camera.name, "record": _record(settings), "provenance": pipeline.places_of(images)}
     if "select" in settings:
         observations = pipeline.select(observations, settings["select"], **options).observations

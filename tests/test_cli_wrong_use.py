@@ -205,6 +205,23 @@ def test_what_no_solution_can_come_of_is_said_before_any_image_is_looked_at(monk
         assert wrong[1] in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, *wrong)
 
 
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["--exclude", "none.png"], "no image 'none.png' to exclude; there are 01.png"),
+        (["--drop-worst", 10], "2 of 12 images would be left; at least 3 must be left"),
+        (["--drop-worst", 99], "0 of 12 images would be left"),
+        (["--drop-worst", 3, "--select", 5], "2 of 12 images would be left"),
+        (["--drop-worst", 9, "--exclude", "01.png"], "2 of 12 images would be left"),
+    ],
+)
+def test_what_cannot_be_left_out_is_said_before_any_image_is_looked_at(
+    options: list[object], words: str, photographs: Path, monkeypatch: pytest.MonkeyPatch, capsys
+) -> None:
+    monkeypatch.setattr(pipeline, "detect", None)
+    assert words in complaint(capsys, "calibrate", photographs, "--board", SmallWorld.spec, *options)
+
+
 def test_undistorting_nothing_leaves_no_folder(camera_file: Path, tmp_path: Path, capsys) -> None:
     write_image(np.full((48, 64), 60, np.uint8), tmp_path / "small.png")
     complaint(capsys, "undistort", camera_file, tmp_path / "small.png", "-o", tmp_path / "new")

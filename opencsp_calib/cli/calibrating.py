@@ -63,6 +63,7 @@ def calibrate(
     pipeline.check_solving(**options)
     files = find_images(images)
     check_not_input((file.path for file in files), output, report)
+    dropping.check_dropping([file.name for file in files], exclude or [], drop_worst, select)
     record = _record(note or [], pixel_pitch)
     options |= {
         "name": name or as_text(files[0].path.absolute().parent.name),
