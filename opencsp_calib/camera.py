@@ -156,7 +156,10 @@ class Camera:
         return undistort(image, self, target)
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write a camera file that OpenCSP reads too; see `opencsp_calib.hdf5`."""
+        """Write a camera file (.h5) that OpenCSP reads too; see `opencsp_calib.hdf5`.
+
+        Other formats are written by `opencsp_calib.camera_files.write_camera_file`.
+        """
         from opencsp_calib.hdf5 import save_camera
 
         save_camera(self, path)

@@ -160,7 +160,10 @@ def _naming(path: str | PathLike[str]) -> Iterator[None]:
 
 
 def write_camera_file(
-    camera: Camera, path: Path, format_name: str | None = None, record: Mapping[str, str] | None = None
+    camera: Camera,
+    path: str | PathLike[str],
+    format_name: str | None = None,
+    record: Mapping[str, str] | None = None,
 ) -> str:
     """Write a camera in the format named, or that its extension means, with the record where there is room for it.
 
@@ -174,6 +177,7 @@ def write_camera_file(
     InputError
         If the format cannot be told, does not exist or cannot carry the camera, or the file cannot be written.
     """
+    path = Path(path)
     writers = {name: f for name, f in installed().camera_formats.items() if f.writes}
     if format_name is not None and format_name not in writers:
         raise InputError(

@@ -55,7 +55,7 @@ def save_camera(camera: Camera, path: str | os.PathLike[str], record: Mapping[st
     Raises
     ------
     InputError
-        If the file cannot be written; what was there before stays.
+        If its name does not end in .h5, .hdf5 or .hdf, or it cannot be written; what was there before stays.
     """
 
     def fill(file: "h5py.File") -> None:

@@ -13,6 +13,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from opencsp_calib.atomic import replacing
+from opencsp_calib.errors import InputError
+from opencsp_calib.hdf5_reading import EXTENSIONS
 from opencsp_calib.seal import seal
 
 if TYPE_CHECKING:
@@ -35,8 +37,13 @@ def write_hdf5(path: str | os.PathLike[str], fill: "Callable[[h5py.File], None]"
     Raises
     ------
     InputError
-        If the file cannot be written; what was there before stays.
+        If it has the extension of something else, or cannot be written; what was there before stays.
     """
+    if Path(path).suffix.lower() not in ("", *EXTENSIONS):
+        raise InputError(
+            f"{path} would be HDF5 under another name: let its name end in .h5; other formats are written by "
+            "`opencsp-calib convert`, and in Python by opencsp_calib.camera_files.write_camera_file"
+        )
     with replacing(path) as temporary:
         with ThreadPoolExecutor(1) as thread:
             thread.submit(_fill, temporary, fill).result()

@@ -16,7 +16,7 @@ from opencsp_calib import (
     SolveOptions,
 )
 from opencsp_calib.board import Board
-from opencsp_calib.errors import FileFormatError
+from opencsp_calib.errors import FileFormatError, InputError
 from opencsp_calib.hdf5 import load_record, read_camera, save_camera
 from opencsp_calib.hdf5_calibration import load_calibration, load_observations, save_calibration, save_observations
 from opencsp_calib.models import LENS_MODELS
@@ -31,6 +31,13 @@ def test_a_camera_comes_back_to_the_last_bit(model: str, tmp_path: Path) -> None
     camera = camera_of(model)
     camera.save(tmp_path / "c.h5")
     assert Camera.load(tmp_path / "c.h5") == camera
+
+
+@pytest.mark.parametrize("name", ["c.yaml", "c.json", "c.png"])
+def test_a_camera_is_not_saved_under_the_name_of_another_format(name: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"let its name end in \.h5; .* in Python by opencsp_calib.*write_camera_file"):
+        camera_of("opencv4").save(tmp_path / name)
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize("model", [m for m in LENS_MODELS if m != "opencv_fisheye"])
