@@ -189,3 +189,11 @@ def test_a_corner_without_contrast_has_no_step() -> None:
     found = fit_corners(grey(CENTRED), 255, p, bends, windows, 1e-5, 20, examine=False)
     assert found[:, 0].tolist() == [CONVERGED, FAILED]
     assert p[1] == pytest.approx(starts[1], abs=1e-5)
+
+
+@pytest.mark.parametrize(("examine", "contrast", "told"), [(True, 1.0, True), (False, 1.0, False), (True, 0.0, False)])
+def test_more_than_the_status_is_told_where_it_is_wanted_and_known(examine: bool, contrast: float, told: bool) -> None:
+    photograph, p = np.rint(100 + contrast * (photograph_of(DIM) - 30)).astype(np.uint8), moved(DIM, a=70.0)[None]
+    found = fit_corners(photograph, 255, p, BENDS[None], HALF[None], 1e-5, 20, examine=examine)[0]
+    assert (found[0] == CONVERGED) == (contrast > 0)
+    assert found[1:].any() == told

@@ -1,5 +1,8 @@
 """The camera file: what is written comes back, and OpenCSP's own way of loading reads it."""
 
+import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -77,47 +80,87 @@ def test_a_record_is_kept_with_a_camera(tmp_path: Path) -> None:
     assert load_record(tmp_path / "d.h5") == {}
 
 
-@pytest.mark.parametrize("board", BOARDS, ids=lambda b: b.kind)
-def test_a_calibration_comes_back_whole(board: Board, tmp_path: Path) -> None:
-    seen = observations(board.with_points(board.points + 1e-4))
-    camera = camera_of("opencv5")
+def test_a_name_that_hdf5_cannot_hold_is_escaped(tmp_path: Path) -> None:
+    """A zero byte, and half of a character, as names of files may have on Linux."""
+    replace(camera_of("opencv4"), name="a\0b\udc80ü").save(tmp_path / "c.h5")
+    assert Camera.load(tmp_path / "c.h5").name == r"a\0b\udc80ü"
+
+
+def calibration_with(board: Board, model: str = "opencv5") -> Calibration:
+    """One in which nothing is as it would be by default."""
+    camera, seen = camera_of(model), observations(board.with_points(board.points + 1e-4))
     poses = (
         Pose(np.array([0.1, 0.2, 0.3]), np.array([0, 0, 2.0])),
         Pose(np.array([0.3, 0, 0]), np.array([0, 0.1, 3.0])),
     )
-    outliers = tuple(np.arange(len(d)) == 2 for d in seen.detections)
-    options = SolveOptions(camera, "free", 1.0, "covariance", True)
-    before = Calibration(
+    return Calibration(
         camera,
         seen,
         poses,
         board.with_points(board.points * 1.001),
         "bundle 1.0",
-        options,
-        outliers=outliers,
-        covariance=np.eye(9) * 4,
+        SolveOptions(camera, "free", 1.0, "covariance", True),
+        outliers=tuple(np.arange(len(d)) == 2 for d in seen.detections),
+        covariance=np.eye(len(camera.params)) * 4,
         problems=(Problem("p", "q"),),
         record={"aperture": "f/8"},
         provenance={"time": "now", "images": {"a/1.png": "/x"}},
     )
+
+
+@pytest.mark.parametrize("board", BOARDS, ids=lambda b: b.kind)
+def test_a_calibration_comes_back_whole(board: Board, tmp_path: Path) -> None:
+    before = calibration_with(board)
+    seen = before.observations
     save_calibration(before, tmp_path / "c.h5")
     after = load_calibration(tmp_path / "c.h5")
     assert type(after.board) is type(board)
     assert after.board == before.board
     assert after.observations.board == seen.board
-    assert (after.camera, after.cam_from_board, after.solver) == (camera, poses, "bundle 1.0")
-    assert after.options == options
+    assert (after.camera, after.cam_from_board, after.solver) == (before.camera, before.cam_from_board, "bundle 1.0")
+    assert after.options == before.options
     assert (after.problems, after.record, after.provenance) == (before.problems, before.record, before.provenance)
     assert after.rms_px == before.rms_px
     np.testing.assert_array_equal(after.covariance, before.covariance)
     assert np.isnan(after.covariance_residual).all()
-    assert np.array_equal(np.concatenate(after.outliers), np.concatenate(outliers))
+    assert np.array_equal(np.concatenate(after.outliers), np.concatenate(before.outliers))
     for old, new in zip(seen.views, after.observations.views, strict=True):
         assert (new.image, new.status, new.problems, new.sha256) == (old.image, old.status, old.problems, old.sha256)
         assert (new.detection.rejected, new.detection.reason) == (old.detection.rejected, old.detection.reason)
         np.testing.assert_array_equal(new.detection.ids, old.detection.ids)
         np.testing.assert_array_equal(new.detection.pixels, old.detection.pixels)
         assert (new.detection.covariance is None) == (old.detection.covariance is None or not len(old.detection))
+
+
+def as_the_page_says() -> dict[str, str]:
+    """Shape and type of each dataset, by docs/file_format.md."""
+    page = (Path(__file__).parents[1] / "docs" / "file_format.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| (`.*`) \| (.*?) \|", page, flags=re.MULTILINE)
+    kinds = {name: kind for names, kind in rows for name in re.findall(r"`(.*?)`", names)}
+    return {name.lstrip("/") if name[0] == "/" else f"Calibration/{name}": kind for name, kind in kinds.items()}
+
+
+@pytest.mark.parametrize(("model", "missing"), [("opencv5", "fisheye"), ("opencv_fisheye", "distortion")])
+def test_a_file_holds_what_its_page_says(model: str, missing: str, tmp_path: Path) -> None:
+    save_calibration(calibration_with(BOARDS[0], model), tmp_path / "c.h5")
+    found: dict[str, h5py.Dataset] = {}
+    sizes: dict[str, int] = {}  # of the page's letters
+    described = as_the_page_says()
+    del described[f"Camera/{missing}_coef"]
+    with h5py.File(tmp_path / "c.h5") as file:
+        file.visititems(lambda name, item: found.update({name: item}) if isinstance(item, h5py.Dataset) else None)
+        assert found.keys() == described.keys()
+        for name, kind in described.items():
+            if kind == "JSON":
+                json.loads(found[name].asstr()[()])
+            elif kind == "string":
+                assert found[name].asstr()[()]
+            else:
+                letters, dtype = re.fullmatch(r"\((.*?),?\) (\w+)", kind).groups()
+                assert found[name].dtype == np.dtype(dtype), name
+                for letter, size in zip(letters.split(", "), found[name].shape, strict=True):
+                    wanted = int(letter) if letter.isdigit() else sizes.setdefault(letter, size)
+                    assert letter == "n" or size == wanted, name  # n is another one in each group
 
 
 @pytest.mark.parametrize(

@@ -52,7 +52,7 @@ def change(path: Path, name: str, value: object) -> None:
         ("Camera/intrinsic_mat", np.eye(2), "shape"),
         ("Camera/intrinsic_mat", np.full((3, 3), np.nan), "finite"),
         ("Camera/intrinsic_mat", [[-5.0, 0, 1], [0, 5, 1], [0, 0, 1]], "positive"),
-        ("Camera/intrinsic_mat", [[5.0, 1, 1], [0, 5, 1], [0, 0, 1]], "skew"),
+        ("Camera/intrinsic_mat", [[5.0, 0.5, 1], [0, 5, 1], [0, 0, 1]], r"skew \(0\.5\)"),
         ("Camera/intrinsic_mat", "text", "numbers"),
         ("Camera/intrinsic_mat", None, "missing"),
         ("Camera/intrinsic_mat", h5py.SoftLink("/Camera/name"), "link"),
