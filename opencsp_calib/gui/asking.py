@@ -18,11 +18,18 @@ async def may_write(path: Path) -> bool:
 
 
 async def may_forget(session: Session) -> bool:
-    """Whether photographs and results may make place for others: nothing is calibrated yet, or the person says so."""
-    if session.calibration is None:
-        return True
-    title = f"The result for {session.calibration.camera.name} would be forgotten."
-    return await _agreed(title, "Files that were saved stay as they are.", "Keep it", "Forget it")
+    """Whether photographs and results may make place for others: nothing is calibrated yet, or the person says so.
+
+    Nor does work with them go on, which another page may have begun while the person was asked.
+    """
+    agreed = True
+    if session.calibration is not None:
+        title = f"The result for {session.calibration.camera.name} would be forgotten."
+        agreed = await _agreed(title, "Files that were saved stay as they are.", "Keep it", "Forget it")
+    if agreed and session.busy:
+        session.say("Wait until what goes on is done, or cancel it.", "bad")
+        return False
+    return agreed
 
 
 async def _agreed(title: str, text: str, no: str, yes: str) -> bool:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from opencsp_calib.board import Board, CharucoBoard, Checkerboard
-from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.errors import CalibError
 from opencsp_calib.gui.described import described
 from opencsp_calib.gui.files import shown
 from opencsp_calib.gui.session import Session
@@ -29,10 +29,8 @@ def take_up(session: Session, path: Path) -> None:
     Raises
     ------
     InputError
-        If the file holds none, or work goes on.
+        If the file holds none.
     """
-    if session.busy:
-        raise InputError("wait until what goes on is done, or cancel it")
     found = load_observations(path)
     chosen = _as_board(found.board) | _as_before(path)
     session.forget_photographs()

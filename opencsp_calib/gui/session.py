@@ -213,6 +213,7 @@ class Session:
         if self.busy:
             return False
         self.progress = Progress(what, total=total)
+        self.worker.begin()
         self.tell()
         try:
             await work()
