@@ -44,6 +44,14 @@ class Server:
             self.process.terminate()
         self.more_output, self.errors = self.process.communicate(timeout=120)
 
+    def hold_worker(self) -> None:
+        """Have the process for long work stand still: what it is asked to do is not over before it is looked at."""
+        import psutil
+
+        workers = [child for child in psutil.Process(self.process.pid).children() if "gui.jobs" in child.cmdline()[-1]]
+        assert len(workers) == 1
+        workers[0].suspend()
+
 
 class Window:
     """The page in a browser."""
@@ -79,13 +87,14 @@ class Window:
         return self.browser.find_element("css selector", f"[data-testid={testid}]")
 
     def until(self, true: Callable[[], Any], patience_s: float = PATIENCE_S) -> Any:
-        """Wait until it is true; elements that are made anew, or just going, do not matter."""
+        """Wait until it is true; elements that are made anew, just going, or on the move, do not matter."""
         from selenium.common import exceptions
 
         passing = (
             exceptions.NoSuchElementException,
             exceptions.StaleElementReferenceException,
             exceptions.ElementNotInteractableException,
+            exceptions.ElementClickInterceptedException,
         )
         end = time.monotonic() + patience_s
         while True:
@@ -147,7 +156,8 @@ class Window:
 
     def tab(self, name: str) -> None:
         """Bring a tab to the front."""
-        self.browser.find_element("xpath", f"//*[@role='tab' and normalize-space()='{name}']").click()
+        tab = f"//*[@role='tab' and normalize-space()='{name}']"
+        self.until(lambda: self._pressed(self.browser.find_element("xpath", tab)))
 
     def choose(self, label: str, words: str) -> None:
         """Take one of the choices of a field."""
