@@ -1,6 +1,7 @@
 """A capture: photographs at the right moments and only then, whole on the disk whatever happens."""
 
 import json
+import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -11,9 +12,12 @@ from worlds import SmallWorld
 
 from opencsp_calib import Board, InputError, Pose
 from opencsp_calib.capture import Capture, CaptureFolder, Release, State, release_from
+from opencsp_calib.capture.learner import Learner
+from opencsp_calib.capture.learning import Study
 from opencsp_calib.coach import Preview
+from opencsp_calib.errors import CalibError
 from opencsp_calib.image import Image
-from opencsp_calib.images import ImageFile, read_image
+from opencsp_calib.images import ImageFile, read_image, write_image
 from opencsp_calib.looking import Search
 from opencsp_calib.registry import installed
 from opencsp_calib.rendering import Exposure, Scene, Spot, render
@@ -184,6 +188,39 @@ def test_what_a_killed_capture_left_is_cleared_and_another_board_refused(tmp_pat
     assert len(again.images) == 1
     with pytest.raises(InputError, match="has photographs of another board, checkerboard:9x6:30mm"):
         folder_of(tmp_path, "checkerboard:8x6:30mm")
+
+
+def test_a_photograph_that_took_the_place_of_another_is_learnt_from(small_world, photographs, tmp_path):
+    """Two are deleted, and the next gets the first one's name, while the coach still learns from the second."""
+    first, second = tmp_path / "0001.png", tmp_path / "0002.png"
+    learner = Learner(Study(search_for(small_world.board), small_world.camera.image_size, None, 0.1))
+    try:
+        for place in (first, second):
+            write_image(np.full((480, 640), 90, np.uint8), place)
+        learner.know([first])
+        assert not learner.wait().views  # where the board is seen
+        learner.know([first, second])
+        learner.know([])
+        first.write_bytes((photographs / "01.png").read_bytes())
+        learner.know([first])
+        assert len(learner.wait().views) == 1
+    finally:
+        learner.close()
+
+
+@pytest.mark.parametrize("rest", [0, 20])
+def test_the_coach_that_dies_is_one_sentence(rest, small_world, tmp_path, monkeypatch):
+    """Before its answer, or in the middle of it."""
+    answer = f"sys.stdout.buffer.write(pickle.dumps(list(range(99)))[:{rest}])"
+    program = [sys.executable, "-c", f"import pickle, sys; pickle.load(sys.stdin.buffer); {answer}"]
+    monkeypatch.setattr("opencsp_calib.capture.learner.own_process", lambda *_, **__: program)
+    learner = Learner(Study(search_for(small_world.board), (64, 64), None, 0.1))
+    try:
+        learner.know([tmp_path / "0001.png"])
+        with pytest.raises(CalibError, match="the coach's process ended unexpectedly"):
+            learner.wait()
+    finally:
+        learner.close()
 
 
 def test_an_image_of_another_size_stops_it(small_world, tmp_path):

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from opencsp_calib.capture.learning import Study
+from opencsp_calib.capture.learning import Photograph, Study
 from opencsp_calib.coach import Knowledge
 from opencsp_calib.errors import CalibError
 from opencsp_calib.processes import BACKGROUND, own_process
@@ -39,8 +39,8 @@ class Learner:
         )
         self._waiting = ThreadPoolExecutor(1, thread_name_prefix="learn")
         self._running: Future[Knowledge] | None = None
-        self._wanted: tuple[Path, ...] = ()
-        self._started: tuple[Path, ...] = ()
+        self._wanted: tuple[Photograph, ...] = ()
+        self._started: tuple[Photograph, ...] = ()
         self.knowledge = study.knowledge
         self._tell(study)
 
@@ -52,7 +52,7 @@ class Learner:
 
     def know(self, photographs: Sequence[Path]) -> None:
         """Learn from these photographs, and no others, as soon as what is running is done."""
-        self._wanted = tuple(photographs)
+        self._wanted = tuple(map(Photograph.at, photographs))
         self._advance()
 
     def wait(self) -> Knowledge:
@@ -77,12 +77,12 @@ class Learner:
             self._started = self._wanted
             self._running = self._waiting.submit(self._learned, self._wanted)
 
-    def _learned(self, photographs: tuple[Path, ...]) -> Knowledge:
+    def _learned(self, photographs: tuple[Photograph, ...]) -> Knowledge:
         assert self._process.stdout is not None  # noqa: S101  # a pipe was asked for
         self._tell(photographs)
         try:
             answer = pickle.load(self._process.stdout)  # noqa: S301  # our own process
-        except EOFError:
+        except (EOFError, pickle.UnpicklingError):  # also in the middle of its answer
             raise CalibError("the coach's process ended unexpectedly (out of memory?)") from None
         if isinstance(answer, Exception):
             raise answer

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 from threadpoolctl import threadpool_limits
 
@@ -23,7 +23,22 @@ from opencsp_calib.looking import Look, Search
 from opencsp_calib.opencv import opencv_on_one_thread
 from opencsp_calib.processes import answers
 
-__all__ = ["Study", "main"]
+__all__ = ["Photograph", "Study", "main"]
+
+
+class Photograph(NamedTuple):
+    """One as it is now: after the last one was deleted, the next gets its number, and its name."""
+
+    path: Path
+    changed_ns: int
+
+    @classmethod
+    def at(cls, path: Path) -> "Photograph":
+        """The photograph there; if there is none any more, looking at it will say so."""
+        try:
+            return cls(path, path.stat().st_mtime_ns)
+        except OSError:
+            return cls(path, 0)
 
 
 class Study:
@@ -40,12 +55,12 @@ class Study:
     def __init__(self, search: Search, image_size: tuple[int, int], range_m: float | None, goal_px: float) -> None:
         self._search, self._image_size = search, image_size
         self._learn = partial(learn, search.board, image_size, range_m=range_m, goal_px=goal_px)
-        self._views: dict[Path, View] = {}
+        self._views: dict[Photograph, View] = {}
         self.knowledge: Knowledge = self._learn()
 
-    def of(self, photographs: Sequence[Path]) -> Knowledge:
+    def of(self, photographs: Sequence[Photograph]) -> Knowledge:
         """What these photographs tell, and no others; each is looked at once."""
-        self._views = {path: self._views.get(path) or self._view(path) for path in photographs}
+        self._views = {one: self._views.get(one) or self._view(one.path) for one in photographs}
         self.knowledge = self._learn(tuple(self._views.values()), before=self.knowledge)
         return self.knowledge
 
