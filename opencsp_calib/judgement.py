@@ -28,6 +28,7 @@ ASPECT_SIGMAS, LEAST_ASPECT = 3.0, 1e-5  # of fx: less matters to nobody, and no
 RANGE_SPREAD = 1.1  # farthest over nearest view
 DISQUALIFYING = ("poor-rms", "not-converged", "undetermined", "head-on", "parallel", "fold-inside")
 REMARKS = ("board-as-given", "board-shape-solved")  # decisions told, not doubts
+OF_ONE_WAY_UP = ("square-pixels-assumed", "pixel-aspect-open")  # say the same, and what became of it
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ def judge(calibration: Calibration) -> tuple[Problem, ...]:
         _parallel(calibration, whole),
         _tilts(views),
         _coverage(whole),
-        _one_way_up(whole),
+        _one_way_up(calibration, whole),
         _one_range(whole),
         _aspect(calibration),
         fold_inside(calibration.camera),
@@ -153,8 +154,10 @@ def _coverage(whole: SetQuality) -> Problem | None:
     return Problem("low-coverage", message)
 
 
-def _one_way_up(whole: SetQuality) -> Problem | None:
+def _one_way_up(calibration: Calibration, whole: SetQuality) -> Problem | None:
     if min(whole.horizontal, whole.vertical) > 0 or whole.views < 2:
+        return None
+    if any(problem.code in OF_ONE_WAY_UP for problem in calibration.problems):
         return None
     way = "horizontal" if whole.horizontal else "vertical"
     message = (

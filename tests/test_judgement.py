@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from worlds import SmallWorld
 
-from opencsp_calib import Calibration, Camera, Checkerboard, Observations, Pose, SolveOptions
+from opencsp_calib import Calibration, Camera, Checkerboard, Observations, Pose, Problem, SolveOptions
 from opencsp_calib.judgement import fold_inside, judge, verdict
 from opencsp_calib.quality import correlations, coverage, set_quality, view_qualities
 from opencsp_calib.synthetic import observe, pose_in_view
@@ -70,6 +70,13 @@ def test_parallel_boards_do_not_determine_the_camera_however_tilted() -> None:
     assert "head-on" not in codes(same)
     assert verdict(same).level == "bad"
     assert "parallel" not in codes(result((tilted(35, 0, 0.5), tilted(20, 0, 0.5))))
+
+
+def test_that_the_board_was_never_turned_is_said_once() -> None:
+    upright = result(tuple(tilted(tilt, 0, 0.7) for tilt in (30, -35, 40)))
+    assert "one-orientation" in codes(upright)
+    for code in ("square-pixels-assumed", "pixel-aspect-open"):
+        assert "one-orientation" not in codes(upright.with_problems(Problem(code, "no view is turned")))
 
 
 def test_views_at_one_range_and_small_ones_are_said() -> None:
