@@ -65,7 +65,8 @@ def checked(value: ArrayLike, name: str, shape: Sequence[int | None], *, finite:
         raise InputError(f"{name} is not an array of numbers: {error}") from None
     _check_shape(array.shape, name, shape)
     if finite and not np.isfinite(array).all():
-        raise InputError(f"{name} has {np.count_nonzero(~np.isfinite(array))} values that are NaN or infinite")
+        lost = np.count_nonzero(~np.isfinite(array))
+        raise InputError(f"{name} has NaN or infinity in {lost} of {array.size} values")
     return array
 
 

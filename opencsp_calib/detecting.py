@@ -14,6 +14,7 @@ from typing import TypeAlias
 from opencsp_calib.blas import blas_on_one_thread
 from opencsp_calib.board import Board
 from opencsp_calib.cluster import Scheduler, connected
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Detection, Observations, Problem, View
 from opencsp_calib.errors import CancelledError, InputError
 from opencsp_calib.images import EncodedImage, ImageFile, read_encoded
@@ -92,7 +93,7 @@ def check_board_seen(observations: Observations) -> None:
     if not observations.used:
         reasons = [view.detection.reason for view in observations.views if view.detection.reason]
         why = max(set(reasons), key=reasons.count) if reasons else "no image can be used"
-        raise InputError(f"no board to calibrate from in any of the {len(observations.views)} images: {why}")
+        raise InputError(f"no board to calibrate from in {counted(len(observations.views), 'image')}: {why}")
     others = [view for view in observations.views if any(p.code == OTHER_BOARD for p in view.problems)]
     if others and not any(_whole(view.detection, observations.board) for view in observations.used):
         more = f" and {len(others) - 1} more show" if len(others) > 1 else " shows"
@@ -154,7 +155,9 @@ def _in_threads(
                 running[pool.submit(look, file)] = index
             done, _ = wait(running, timeout=0.1, return_when=FIRST_COMPLETED)
             if stop is not None and stop.is_set():
-                raise CancelledError(f"stopped after {len(looks)} of {len(files)} images; nothing was written")
+                raise CancelledError(
+                    f"stopped after {len(looks)} of {counted(len(files), 'image')}; nothing was written"
+                )
             for future in done:
                 index = running.pop(future)
                 looks[index] = future.result()
@@ -172,7 +175,7 @@ def _gathered(looks: Sequence[Look], board: Board) -> Observations:
     sizes = sizes or Counter(look.size for look in looks if look.size)
     if not sizes:
         first = looks[0].view
-        raise InputError(f"none of the {len(looks)} images can be read; the first: {first.detection.reason}")
+        raise InputError(f"no image can be read of {len(looks)}; the first: {first.detection.reason}")
     size = sizes.most_common(1)[0][0]
     seen: dict[str, str] = {}
     views = []

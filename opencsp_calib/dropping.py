@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterable
 
 from opencsp_calib.calibration import LEAST_VIEWS, Calibration, Solve
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import InputError
 from opencsp_calib.quality import worst_views
@@ -37,7 +38,7 @@ def check_dropping(
     kept = len(set(images) - set(exclude))
     left = max(min(kept, select or kept) - worst, 0)
     if left < LEAST_VIEWS and (exclude or worst):
-        raise InputError(f"{left} of {len(images)} images would be left; at least {LEAST_VIEWS} must be left")
+        raise InputError(f"{left} of {counted(len(images), 'image')} would be left: at least {LEAST_VIEWS} must be")
 
 
 def excluding(observations: Observations, names: Iterable[str]) -> Observations:
@@ -82,7 +83,7 @@ def drop_above(calibration: Calibration, limit_px: float, solve: Solve) -> Calib
             return calibration
         if len(used) - len(above) < LEAST_VIEWS:
             raise InputError(
-                f"{len(above)} of {len(used)} views have an rms above {limit_px:g} px; at least {LEAST_VIEWS} must "
+                f"the rms of {len(above)} of {len(used)} views is above {limit_px:g} px; at least {LEAST_VIEWS} must "
                 "be left: take better photographs, or raise the limit"
             )
         calibration = _without(calibration, above, solve)

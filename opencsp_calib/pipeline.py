@@ -17,6 +17,7 @@ from opencsp_calib.board_file import read_board_file
 from opencsp_calib.calibration import LEAST_VIEWS, Calibration
 from opencsp_calib.camera import Camera
 from opencsp_calib.cluster import Scheduler
+from opencsp_calib.counted import counted
 from opencsp_calib.detecting import Progress, Stop, check_board_seen, look_at
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibrationFailedError, InputError
@@ -260,8 +261,8 @@ def _check_views(observations: Observations) -> None:
     used, looked_at = len(observations.used), len(observations.views)
     if used < LEAST_VIEWS:
         raise InputError(
-            f"only {used} of {looked_at} images can be used; a calibration needs at least {LEAST_VIEWS} views, "
-            "better about 50"
+            f"only {used} of {counted(looked_at, 'image')} can be used; a calibration needs at least {LEAST_VIEWS} "
+            "views, better about 50"
         )
     # the same pose again adds no information: a solver would fail, or worse, not fail
     if all(np.array_equal(d.pixels, observations.detections[0].pixels) for d in observations.detections[1:]):

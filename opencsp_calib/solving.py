@@ -8,6 +8,7 @@ from opencsp_calib.arrays import Floats, Mask, Params
 from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Observations, Problem
 from opencsp_calib.errors import CalibrationFailedError, InputError
 from opencsp_calib.interfaces import Solver
@@ -59,12 +60,15 @@ def check_request(solver: Solver, observations: Observations, model: str, option
         raise InputError(f"the solver {solver.name!r} cannot {' or '.join(ABILITIES[name] for name in lacking)}")
     used = observations.used
     if len(used) < MIN_VIEWS:
-        raise InputError(f"{len(used)} usable view(s): at least {MIN_VIEWS} are needed, and 10 or more are wise")
+        raise InputError(
+            f"{counted(len(used), 'usable view')}: at least {MIN_VIEWS} are needed, and 10 or more are wise"
+        )
     for view in used:
         ids = view.detection.ids
         if len(ids) < MIN_CORNERS or on_one_line(observations.board.points[ids]):
             raise InputError(
-                f"{view.image} has {len(ids)} corners; a view needs {MIN_CORNERS}, not all on one line; drop it"
+                f"{view.image} has {counted(len(ids), 'corner')}; a view needs {MIN_CORNERS}, not all on one line; "
+                "drop it"
             )
         if options.weights == "covariance" and view.detection.covariance is None:
             raise InputError(f"{view.image} has corners without covariance; refine them, or take equal weights")

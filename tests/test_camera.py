@@ -48,7 +48,7 @@ def test_only_whole_numbers_reduce(n: float) -> None:
     ("change", "message"),
     [
         ({"params": [1, 2, 3]}, r"params has shape \(3,\), expected \(8,\)"),
-        ({"params": [np.nan] * 8}, "8 values that are NaN"),
+        ({"params": [np.nan] * 8}, "NaN or infinity in 8 of 8 values"),
         ({"params": [-1, 1, 0, 0, 0, 0, 0, 0]}, "focal lengths must be positive"),
         ({"params": ["a"] * 8}, "not an array of numbers"),
         ({"image_size": (0, 10)}, "positive whole numbers"),

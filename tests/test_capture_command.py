@@ -52,7 +52,7 @@ def test_it_goes_on_where_it_stopped_and_takes_no_file_twice(incoming, tmp_path,
     for count, taken in ((2, 2), (50, COUNT), (50, COUNT)):
         assert capture(tmp_path, incoming, "--release", "interval:0", "--count", str(count)) == 0
         assert len(list(tmp_path.glob("*.png"))) == taken
-    assert f"has {COUNT} photographs already: going on after them" in capsys.readouterr().err
+    assert f"has {COUNT} photographs already: going on from there" in capsys.readouterr().err
 
 
 def test_a_full_disk_stops_it_with_nothing_lost(incoming, tmp_path, capsys):
@@ -72,7 +72,7 @@ def test_a_full_disk_stops_it_with_nothing_lost(incoming, tmp_path, capsys):
             read_image(ImageFile(name, disk / "set" / name))
         assert not [name for name in names if name.startswith(".")]
         assert "No space left on device" in said
-        assert f"the {len(images)} photographs taken are safe" in said
+        assert f"{len(images)} photographs are safe" in said
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
         assert capture(disk / "set", incoming, "--release", "interval:0", "--count", str(COUNT)) == 0
         assert len(list((disk / "set").glob("*.png"))) == COUNT

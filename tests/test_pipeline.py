@@ -170,7 +170,7 @@ def test_no_board_says_the_commonest_reason(tmp_path: Path, small_world: SmallWo
         replace(view, status="no board", detection=opencsp_calib.Detection.nothing("too dark"))
         for view in observe(small_world.camera, small_world.board, small_world.poses).views
     )
-    with pytest.raises(InputError, match="any of the 12 images: too dark"):
+    with pytest.raises(InputError, match="in 12 images: too dark"):
         solve(Observations(Checkerboard(9, 6, 0.03), (640, 480), nothing))
 
 

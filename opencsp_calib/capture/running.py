@@ -13,6 +13,7 @@ from opencsp_calib.capture.folder import CaptureFolder
 from opencsp_calib.capture.release import release_from
 from opencsp_calib.coach import Knowledge
 from opencsp_calib.coach.knowledge import GOAL_PX
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import InputError
 from opencsp_calib.interfaces import ImageSource
 from opencsp_calib.looking import Search
@@ -76,7 +77,8 @@ class Prepared:
         """What to say where it was stopped."""
         folder = self.capture.folder
         taken = len(folder.images)
-        return f"the {taken} photographs taken are safe in {folder.path}, and the same capture goes on after them"
+        safe = counted(taken, "photograph is", "photographs are")
+        return f"{safe} safe in {folder.path}, and the same capture goes on from there"
 
 
 def prepared(
@@ -106,7 +108,7 @@ def prepared(
     photographs = CaptureFolder.opened(folder, found.spec, source, device)
     before = len(photographs.images)
     if before:
-        tell(f"{folder} has {before} photographs already: going on after them")
+        tell(f"{folder} has {counted(before, 'photograph')} already: going on from there")
     search = Search(found, detector, "model" if detector.feature == "corner" else "none")
     capture = Capture(photographs, search, how, count, range_m=range_m, goal_px=goal_px)
     return Prepared(capture, chosen, device, settings)

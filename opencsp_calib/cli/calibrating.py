@@ -11,6 +11,7 @@ from opencsp_calib.cli.console import print_json, progress_bar, say, say_judgeme
 from opencsp_calib.cli.finding import detected_aloud, kept_beside
 from opencsp_calib.cli.solving_options import with_solving_options
 from opencsp_calib.cli.targets import check_not_input, check_targets
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import InputError
 
 if TYPE_CHECKING:
@@ -239,7 +240,7 @@ def _say_result(result: "Calibration", before: "Calibration | None") -> None:
     size = "x".join(map(str, camera.image_size))
     say(f"{camera.name}: {camera.model}, {size}, {result.solver}, board {result.options.board_shape}")
     outliers = result.rejected_corners
-    rejected = f", {outliers} corner{'s' * (outliers > 1)} rejected" if outliers else ""
+    rejected = f", {counted(outliers, 'corner')} rejected" if outliers else ""
     say(f"{_count(result.observations)}, rms {result.rms_px:.4f} px{rejected}")
     if before is not None:
         say(f"before images were dropped: {_count(before.observations)}, rms {before.rms_px:.4f} px")
@@ -248,4 +249,4 @@ def _say_result(result: "Calibration", before: "Calibration | None") -> None:
 
 def _count(observations: "Observations") -> str:
     corners = sum(len(detection) for detection in observations.detections)
-    return f"{len(observations.used)} of {len(observations.views)} images used, {corners} corners"
+    return f"{len(observations.used)} of {counted(len(observations.views), 'image')} used, {counted(corners, 'corner')}"

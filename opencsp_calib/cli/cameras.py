@@ -14,6 +14,7 @@ from opencsp_calib.cli.camera_files import (
     camera_in,
 )
 from opencsp_calib.cli.console import print_json, progress_bar, say, say_judgement, say_problems, say_table
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import InputError
 
 
@@ -103,7 +104,7 @@ def undistort(
     files = find_images(images)
     with progress_bar("Undistorting") as advance:
         undistort_images(lens, files, output, advance)
-    say(f"{len(files)} images saved in {output}")
+    say(f"{counted(len(files), 'image')} saved in {output}")
 
 
 COMMANDS = (show, compare, undistort)

@@ -8,6 +8,7 @@ import typer
 
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import say
+from opencsp_calib.counted import counted
 
 if TYPE_CHECKING:
     from opencsp_calib.capture import CaptureFolder, Prepared
@@ -86,7 +87,7 @@ def _run(ready: "Prepared") -> "Knowledge | None":
 
 def _say_end(folder: "CaptureFolder", count: int, knowledge: "Knowledge | None", board: str) -> None:
     taken = len(folder.images)
-    say(f"{taken} of {count} photographs are in {folder.path}")
+    say(f"{taken} of {counted(count, 'photograph is', 'photographs are')} in {folder.path}")
     if not taken:
         return
     if knowledge is not None:

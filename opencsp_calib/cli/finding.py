@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from opencsp_calib.cli.console import detection_progress, say, say_unused
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import CalibError, CancelledError, InputError
 
 if TYPE_CHECKING:
@@ -52,8 +53,10 @@ def detected_aloud(images: list[str], board: "Board", journal: "Journal | None" 
     with detection_progress() as progress:
         observations = pipeline.detect(images, board, progress=progress, journal=journal, **how)
     if journal and journal.taken:
-        say(f"{journal.taken} of {len(observations.views)} images had been looked at before ({journal.path})")
+        say(
+            f"{journal.taken} of {counted(len(observations.views), 'image')} had been looked at before ({journal.path})"
+        )
     if journal and journal.foreign:
-        say(f"{journal.foreign} results in {journal.path} are of other settings or versions: not used")
+        say(f"not used, of other settings or versions: {counted(journal.foreign, 'result')} in {journal.path}")
     say_unused(observations)
     return observations

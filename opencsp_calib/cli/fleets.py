@@ -10,6 +10,7 @@ import typer
 from opencsp_calib.cli import arguments as args
 from opencsp_calib.cli.console import print_json, progress_bar, say, say_table
 from opencsp_calib.cli.solving_options import Model, SolverName
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import CancelledError, InputError
 
 if TYPE_CHECKING:
@@ -134,7 +135,7 @@ def _calibrated(
             results.append(result)
     except (KeyboardInterrupt, CancelledError) as error:
         what = str(error) or "stopped"
-        done = f"{len(results)} of {len(cameras)} cameras are done"
+        done = f"{len(results)} of {counted(len(cameras), 'camera is', 'cameras are')} done"
         raise CancelledError(f"{what}; {done}, and --resume goes on from there") from None
     for journal in journals:
         journal.remove()

@@ -13,8 +13,9 @@ from opencsp_calib.arrays import Matrix
 from opencsp_calib.board import Board
 from opencsp_calib.calibration import Calibration
 from opencsp_calib.camera import Camera
-from opencsp_calib.coach.lacking import Lack, lacks, more_views
+from opencsp_calib.coach.lacking import Lack, lacks
 from opencsp_calib.coach.next_view import SHAPED, SIGMA_PX, Candidates, NextView, candidates, choose, detection_from
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError
 from opencsp_calib.information import ProjectionGoal, view_information
@@ -186,7 +187,7 @@ def _still_possible(camera: Camera, before: Knowledge | None) -> Candidates | No
 def _solved(observations: Observations) -> tuple[Calibration | None, str]:
     count = len(observations.used)
     if count < ENOUGH_TO_SOLVE:
-        return None, f"{more_views(ENOUGH_TO_SOLVE - count)} until the camera can be told"
+        return None, f"{counted(ENOUGH_TO_SOLVE - count, 'more view')} until the camera can be told"
     try:
         return solve(observations), ""
     except (CalibError, np.linalg.LinAlgError) as error:

@@ -9,12 +9,13 @@ import numpy as np
 from opencsp_calib.arrays import Pixels
 from opencsp_calib.board import Board
 from opencsp_calib.camera import Camera
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Observations
 from opencsp_calib.judgement import FEW_VIEWS, RANGE_SPREAD
 from opencsp_calib.pose import Pose
 from opencsp_calib.quality import held, range_of
 
-__all__ = ["REGIONS", "TILT_ALLOWED_DEG", "Lack", "lacks", "more_views"]
+__all__ = ["REGIONS", "TILT_ALLOWED_DEG", "Lack", "lacks"]
 
 TILT_ALLOWED_DEG = (25.0, 50.0)  # 30 to 45 are asked for; a person does not hold a board to a degree
 REACH = 0.2  # of the image's width and height: corners of the board this near to an edge reach it
@@ -64,20 +65,15 @@ def lacks(observations: Observations, poses: Sequence[Pose]) -> tuple[Lack, ...]
 def _views(count: int) -> Lack | None:
     if count >= FEW_VIEWS:
         return None
-    return Lack("views", f"{more_views(FEW_VIEWS - count)} at least", _no_view_by_itself)
-
-
-def more_views(count: int) -> str:
-    """So many more views, in words."""
-    return f"{count} more {'view' if count == 1 else 'views'}"
+    return Lack("views", f"{counted(FEW_VIEWS - count, 'more view')} at least", _no_view_by_itself)
 
 
 def _tilt(poses: Sequence[Pose]) -> Lack | None:
     good = sum(map(_is_tilted_well, poses))
     if poses and good >= len(poses) / 2:
         return None
-    message = "tilt the board by 30 to 45 degrees" + (f": {good} of {len(poses)} views have that" if poses else "")
-    return Lack("tilt", message, _tilts)
+    so_far = f": {good} of {counted(len(poses), 'view')} so far" if poses else ""
+    return Lack("tilt", f"tilt the board by 30 to 45 degrees{so_far}", _tilts)
 
 
 def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
@@ -86,7 +82,8 @@ def _orientation(board: Board, poses: Sequence[Pose]) -> Lack | None:
     rarer = min(counts, key=lambda way: counts[way])
     if poses and counts[rarer] >= LEAST_OF_EACH * len(poses):
         return None
-    message = f"hold the board {rarer}: {counts['horizontal']} views are horizontal, {counts['vertical']} vertical"
+    horizontal = counted(counts["horizontal"], "view is", "views are")
+    message = f"hold the board {rarer}: {horizontal} horizontal, {counts['vertical']} vertical"
     if not poses:
         message = "half of the views with the board horizontal, half vertical"
     return Lack("orientation", message, partial(_holds, rarer))

@@ -13,6 +13,7 @@ from nicegui import ui
 from opencsp_calib.camera import Camera
 from opencsp_calib.camera_files import CameraFile, convert, read_camera_file, write_camera_file
 from opencsp_calib.comparison import compare
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.asking import may_forget, may_write
 from opencsp_calib.gui.controls import choice, field, offer, quiet_action
@@ -183,7 +184,7 @@ def _undistort(page: "Page", chosen: Chosen) -> Refresh:
     async def work(folder: Path) -> None:
         images = [str(file.path) for file in session.selection.files]
         await session.job("undistort", camera=chosen.asked, images=images, folder=str(folder))
-        session.message = Message(f"{len(images)} images saved in {shown(session.folder, folder)}", "good")
+        session.message = Message(f"{counted(len(images), 'image')} saved in {shown(session.folder, folder)}", "good")
 
     async def run() -> None:
         try:

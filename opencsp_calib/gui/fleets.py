@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from nicegui import ui
 
+from opencsp_calib.counted import counted
 from opencsp_calib.gui.controls import action, field
 from opencsp_calib.gui.files import shown, within
 from opencsp_calib.gui.news import Message
@@ -32,7 +33,7 @@ def build(page: "Page") -> Callable[[], None]:
         results = await session.job("fleet", where=str(within(session.folder, place.value or ".")), given=given)
         found.set_content(_told(results["cameras"]))
         bad = [one["name"] for one in results["cameras"] if one["verdict"] in ("bad", "failed")]
-        text = f"{len(results['cameras'])} cameras done, {len(bad)} of them bad or failed. "
+        text = f"{counted(len(results['cameras']), 'camera')} done, {len(bad)} of them bad or failed. "
         text += f"Report: {shown(session.folder, within(session.folder, results['report']))}"
         session.message = Message(text, "bad" if bad else "good")
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from nicegui import Event
 
+from opencsp_calib.counted import counted
 from opencsp_calib.gui.news import Message
 from opencsp_calib.processes import own_process
 
@@ -78,7 +79,7 @@ class LiveCapture:
             elif "say" in answer:
                 self.message = Message(answer["say"])
             elif "done" in answer:
-                ended = Message(f"{answer['done']} photographs are taken. {NEXT}", "good")
+                ended = Message(f"{counted(answer['done'], 'photograph is', 'photographs are')} taken. {NEXT}", "good")
             else:
                 ended = Message(answer["error"], "bad")
             self.changed.emit()

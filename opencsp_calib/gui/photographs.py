@@ -7,6 +7,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import CalibError
 from opencsp_calib.gui.asking import may_forget
 from opencsp_calib.gui.controls import action, field
@@ -71,7 +72,7 @@ def build(page: "Page") -> Callable[[], None]:
         chosen = session.selection
         received = [f"{done} of {total} received" for done, total in chosen.receiving.values()]
         kept = f"corners from {session.kept}" if session.kept and not chosen.files else ""
-        count.set_text("; ".join(received) or kept or f"{len(chosen.files)} photographs")
+        count.set_text("; ".join(received) or kept or counted(len(chosen.files), "photograph"))
         clear.set_enabled(bool(chosen.files or kept) and not session.busy and not chosen.receiving)
         select.set_enabled(not session.busy)
 
@@ -86,7 +87,7 @@ def _folder_field(page: "Page") -> None:
             path = within(session.folder, folder.value)
             if not is_kept(path):
                 source, found = session.selection.add(folder.value or ".")
-                session.say(f"{found} photographs in {source}.")
+                session.say(f"{counted(found, 'photograph')} in {source}.")
             elif await may_forget(session):
                 take_up(session, path)
         except CalibError as error:

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Iterable
 from functools import partial
 
+from opencsp_calib.counted import counted
 from opencsp_calib.gui.described import described
 from opencsp_calib.gui.files import within
 from opencsp_calib.gui.news import Level, Message
@@ -71,7 +72,7 @@ async def _find_corners(session: Session) -> None:
         session.looking = False
         session.views = await asyncio.to_thread(described, session.observations)
     session.removed &= {view.image for view in found.views}
-    text = f"The board is found in {len(found.used)} of {len(found.views)} photographs."
+    text = f"The board is found in {len(found.used)} of {counted(len(found.views), 'photograph')}."
     session.message = Message(text, "good" if found.used else "bad")
 
 

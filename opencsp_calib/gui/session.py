@@ -13,6 +13,7 @@ from typing import Any
 from nicegui import Event
 
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import Observations
 from opencsp_calib.errors import CalibError, InputError
 from opencsp_calib.gui.board_text import board_text
@@ -128,7 +129,7 @@ class Session:
     def end_batch(self, batch: str) -> None:
         """No more photographs of this batch of uploads will come."""
         if self.selection.end(batch):
-            self.say(f"{len(self.selection.files)} photographs selected.")
+            self.say(f"{counted(len(self.selection.files), 'photograph')} selected.")
 
     def cancel(self) -> None:
         """Stop the work that goes on."""

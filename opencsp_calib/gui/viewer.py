@@ -10,6 +10,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import View
 from opencsp_calib.gui.routes import WHOLE_PX
 from opencsp_calib.gui.session import Session
@@ -125,7 +126,7 @@ def _residuals(session: Session, view: View) -> Any:
 
 def _caption(session: Session, view: View, enlarged: float) -> str:
     status = "left out" if view.image in session.removed else view.status
-    parts = [f"{status}, {len(view.detection)} corners"]
+    parts = [f"{status}, {counted(len(view.detection), 'corner')}"]
     if session.calibration is not None:
         used = [one.image for one in session.calibration.observations.used]
         if view.image in used:

@@ -155,7 +155,7 @@ def _light_problems(light: Light | None) -> Iterator[Problem]:
 
 def _place_problems(quality: PhotographQuality, detection: Detection) -> Iterator[Problem]:
     if quality.at_border:
-        message = f"{quality.at_border} of {len(detection)} corners are within half a square of the image's border"
+        message = f"within half a square of the image's border: {quality.at_border} of {len(detection)} corners"
         yield Problem("at-border", f"{message}: move the board inwards a little")
     if quality.rejected > MOST_REJECTED:
         message = f"{quality.rejected:.0%} of the corners found are of no use, most often: {quality.rejected_for}"

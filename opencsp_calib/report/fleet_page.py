@@ -6,6 +6,7 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from opencsp_calib.counted import counted
 from opencsp_calib.fleet import REPORT_FILE, FleetResult
 from opencsp_calib.judgement import judge
 from opencsp_calib.report.document import write_document
@@ -38,7 +39,7 @@ def write_fleet(results: Sequence[FleetResult], title: str, path: str | os.PathL
     said = ", ".join(f"{count} {word}" for word, count in counts.items() if count)
     level = "bad" if counts["failed"] or counts["do not use"] else "doubt" if counts["usable"] else "good"
     changed = [one.name for one in results if one.change and one.change.level == "changed"]
-    verdict = f'<div class="verdict {level}">{len(results)} cameras: {said}.</div>'
+    verdict = f'<div class="verdict {level}">{counted(len(results), "camera")}: {said}.</div>'
     since = f"<p>Changed since last time: {escape(', '.join(changed))}.</p>" if changed else ""
     head = "".join(f"<th>{escape(name)}</th>" for name in HEAD)
     rows = "".join(_row(one, Path(path).parent) for one in results)

@@ -11,6 +11,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats, Pixels
 from opencsp_calib.calibration import Calibration
+from opencsp_calib.counted import counted
 from opencsp_calib.detection import View
 from opencsp_calib.errors import CalibError
 from opencsp_calib.images import ImageFile, encode_thumbnail, read_image
@@ -75,7 +76,7 @@ def _figure(view: View, thumbnail: str, calibration: Calibration, residuals: Flo
         f'<svg viewBox="-0.5 -0.5 {width} {height}" role="img" aria-label="{escape(view.image, quote=True)}">'
         f'<rect class="empty" x="-0.5" y="-0.5" width="{width}" height="{height}"/>'
         f"{picture}{corners}{rejected}{arrows}</svg>"
-        f"<figcaption><b>{escape(view.image)}</b>: {view.status}, {len(view.detection)} corners{rms}"
+        f"<figcaption><b>{escape(view.image)}</b>: {view.status}, {counted(len(view.detection), 'corner')}{rms}"
         f"{'<br>' + problems if problems else ''}</figcaption></figure>"
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from opencsp_calib import Problem
 from opencsp_calib.arrays import Floats
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -145,7 +146,8 @@ def _of_distortion(
     given = _parameters(fields, "distortionParams")
     if len(given) not in (0, COUNTS[distortion]):
         raise FileFormatError(
-            f"{fields.path('distortionParams')} has {len(given)} numbers, {distortion} has {COUNTS[distortion]}"
+            f"{fields.path('distortionParams')} has {counted(len(given), 'number')}, {distortion} has "
+            f"{COUNTS[distortion]}"
         )
     d = given if len(given) else np.zeros(COUNTS[distortion])
     if distortion == "fisheye1" and d[0] != 0:

@@ -18,6 +18,7 @@ from typing import NamedTuple
 from opencsp_calib import Camera, InputError
 from opencsp_calib.arrays import Params
 from opencsp_calib.atomic import replacing
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.interfaces import Imported
 from opencsp_calib_formats.colmap_models import MODEL_OF_ID, PARAMETERS, imported
@@ -123,7 +124,7 @@ def _of_bytes(data: bytes) -> list[Entry]:
         raise FileFormatError("cut short: a COLMAP file has at least 8 bytes")
     (count,) = struct.unpack_from("<Q", data)
     if count * RECORD.size > len(data):
-        raise FileFormatError(f"claims {count} cameras in {len(data)} bytes")
+        raise FileFormatError(f"claims {counted(count, 'camera')} in {len(data)} bytes")
     offset, entries = 8, []
     for index in range(count):
         if offset + RECORD.size > len(data):

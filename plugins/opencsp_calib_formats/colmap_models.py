@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from opencsp_calib.arrays import Floats, Points
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -95,7 +96,7 @@ def imported(name: str, model: str, params: Sequence[float], image_size: tuple[i
         raise FileFormatError(f"COLMAP has no camera model {model[:40]!r}")
     names = PARAMETERS[model]
     if len(params) != len(names):
-        raise FileFormatError(f"a {model} camera has {len(params)} parameters, expected {' '.join(names)}")
+        raise FileFormatError(f"a {model} camera has {counted(len(params), 'parameter')}, expected {' '.join(names)}")
     if model == "EQUIRECTANGULAR":
         return not_exactly(("the projection EQUIRECTANGULAR (the whole sphere)",), None, image_size)
     centre = names.index("cx")

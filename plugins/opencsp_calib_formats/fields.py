@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from opencsp_calib.arrays import Floats
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib_formats.safe_text import Repeated
 
@@ -169,7 +170,7 @@ def matrix(value: Any, what: str, rows: int, columns: int) -> Floats:
             raise FileFormatError(f"{what} is {shape[0]}x{shape[1]}, expected {rows}x{columns}")
     else:
         if isinstance(value, list) and len(value) != rows and any(isinstance(item, list) for item in value):
-            raise FileFormatError(f"{what} has {len(value)} rows, expected {rows}")
+            raise FileFormatError(f"{what} has {counted(len(value), 'row')}, expected {rows}")
         flat = numbers(value, what)
     return _counted(flat, what, (rows * columns,)).reshape(rows, columns)
 
@@ -187,7 +188,9 @@ def _mapped(fields: Fields) -> tuple[Floats, tuple[int, int] | None]:
         return flat, None
     shape = fields.whole("rows"), fields.whole("cols")
     if shape[0] * shape[1] != len(flat):
-        raise FileFormatError(f"{fields.where} is said to be {shape[0]}x{shape[1]}, but has {len(flat)} numbers")
+        raise FileFormatError(
+            f"{fields.where} is said to be {shape[0]}x{shape[1]}, but has {counted(len(flat), 'number')}"
+        )
     return flat, shape
 
 
@@ -213,7 +216,7 @@ def _flat(value: Any, what: str) -> Iterator[Any]:
 
 def _counted(flat: Floats, what: str, counts: tuple[int, ...]) -> Floats:
     if counts and len(flat) not in counts:
-        raise FileFormatError(f"{what} has {len(flat)} numbers, expected {' or '.join(map(str, counts))}")
+        raise FileFormatError(f"{what} has {counted(len(flat), 'number')}, expected {' or '.join(map(str, counts))}")
     return flat
 
 

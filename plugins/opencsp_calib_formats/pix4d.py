@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from opencsp_calib import InputError
+from opencsp_calib.counted import counted
 from opencsp_calib.errors import FileFormatError
 from opencsp_calib.importing import as_imported, not_exactly
 from opencsp_calib.interfaces import Imported
@@ -98,7 +99,7 @@ def _of_txt(text: str) -> dict[str, Imported]:
         raise FileFormatError("the header names no radial distortion: a fisheye's parameters, which we cannot read")
     lines = [line for line in body.split("\n")[1:] if line.strip()]
     if not lines or len(lines) % BLOCK:
-        raise FileFormatError(f"{len(lines)} lines of photographs, expected {BLOCK} for each: truncated?")
+        raise FileFormatError(f"{counted(len(lines), 'line')} of photographs, expected {BLOCK} for each: truncated?")
     different = {found: name for name, found in reversed(list(_photographs(lines)))}
     named = ((name, found) for found, name in reversed(different.items()))
     return each_camera(named, lambda name, found: _of_numbers(name, *found))

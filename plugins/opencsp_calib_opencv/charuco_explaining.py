@@ -6,6 +6,7 @@ import numpy as np
 
 from opencsp_calib.arrays import Floats
 from opencsp_calib.board import CharucoBoard
+from opencsp_calib.counted import counted
 from opencsp_calib_opencv.board_kinds import DICTIONARIES
 from opencsp_calib_opencv.layout import laid_out, read_board
 from opencsp_calib_opencv.levels import Level
@@ -45,7 +46,7 @@ def why_no_charuco(level: Level, board: CharucoBoard, quads: Floats, markers: Ma
         found = None if candidates is None else _most_markers(level, candidates, inverted)
         if found:
             colours = "" if inverted == board.inverted else f", {COLOURS[inverted]}"
-            return f"found {found[1]} markers of {found[0]}{colours}, none of {board.dictionary}"
+            return f"found {counted(found[1], 'marker')} of {found[0]}{colours}, none of {board.dictionary}"
     if len(markers.ids):
         return f"only {len(markers.ids)} of the board's markers could be read; go nearer, focus, or light it evenly"
     return f"no marker of {board.dictionary}, nor of any other dictionary, was found"
@@ -83,7 +84,7 @@ def _most_markers(level: Level, quads: Floats, inverted: bool) -> tuple[str, int
 
 
 def _arranged_otherwise(board: CharucoBoard, markers: Markers) -> str:
-    seen = f"{len(markers.ids)} of its markers were found, but "
+    seen = f"{counted(len(markers.ids), 'of its markers was', 'of its markers were')} found, but "
     if len(markers.ids) - len(np.unique(markers.ids)) >= FEWEST_MARKERS:
         return f"{seen}some of them twice: two such boards are in view; cover one, or leave out the image"
     for other, advice in _variants(board):

@@ -31,7 +31,7 @@ def emptiness(image: Image) -> str | None:
 def incomplete(found: int, board: Board) -> str:
     """Why there are no more corners than were found; empty where all were."""
     missing = len(board.points) - found
-    return f"{missing} of {len(board.points)} corners are out of view, covered or too unclear" if missing else ""
+    return f"out of view, covered or too unclear: {missing} of {len(board.points)} corners" if missing else ""
 
 
 def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
