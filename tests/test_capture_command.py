@@ -15,6 +15,7 @@ import pytest
 from worlds import SmallWorld
 
 from opencsp_calib.cli import run
+from opencsp_calib.counted import counted
 from opencsp_calib.images import ImageFile, read_image, write_image
 from opencsp_calib.rendering import render
 
@@ -72,7 +73,7 @@ def test_a_full_disk_stops_it_with_nothing_lost(incoming, tmp_path, capsys):
             read_image(ImageFile(name, disk / "set" / name))
         assert not [name for name in names if name.startswith(".")]
         assert "No space left on device" in said
-        assert f"{len(images)} photographs are safe" in said
+        assert f"{counted(len(images), 'photograph is', 'photographs are')} safe in" in said
         subprocess.run(["mount", "-o", "remount,size=20m", disk], check=True)
         assert capture(disk / "set", incoming, "--release", "interval:0", "--count", str(COUNT)) == 0
         assert len(list((disk / "set").glob("*.png"))) == COUNT

@@ -103,6 +103,14 @@ def test_help_and_version_are_quiet() -> None:
         assert result.stderr == ""
 
 
+def test_help_says_what_a_beginner_would_get_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["calibrate", "--help"]) == 0
+    output = capsys.readouterr()
+    said = " ".join((output.out + output.err).split())
+    assert "inner corners, either way round" in said
+    assert "exit code is 0 when there is a camera, even one of which is said last that it should not be used" in said
+
+
 def test_help_is_quick_as_it_loads_nothing_that_it_does_not_need() -> None:
     command = [sys.executable, "-X", "importtime", "-m", "opencsp_calib", "calibrate", "--help"]
     result = subprocess.run(command, capture_output=True, text=True, check=True)

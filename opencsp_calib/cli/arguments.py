@@ -13,7 +13,7 @@ BoardSpec = Annotated[
     typer.Option(
         "--board",
         metavar="SPEC",
-        help="checkerboard:COLUMNSxROWS:SIZE (inner corners, such as checkerboard:18x23:50mm), "
+        help="checkerboard:COLUMNSxROWS:SIZE (inner corners, either way round, such as checkerboard:18x23:50mm), "
         "charuco:COLUMNSxROWS:SQUARE:MARKER:DICTIONARY (squares; followed by :inverted or :legacy where it is so), "
         "or a board file.",
     ),

@@ -52,7 +52,11 @@ def calibrate(
     report: args.Report = None,
     json: args.Json = False,
 ) -> None:
-    """Calibrate a camera from photographs of a board."""
+    """Calibrate a camera from photographs of a board.
+
+    The exit code is 0 when there is a camera, even one of which is said last that it should not be used; 1 when there
+    is none; 2 where something given is wrong.
+    """
     from opencsp_calib import dropping, pipeline
     from opencsp_calib.images import as_text, find_images
 
