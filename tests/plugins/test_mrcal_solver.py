@@ -42,7 +42,9 @@ def test_exact_pixels_of_a_measured_board_give_the_camera():
 def test_the_board_as_grid_and_as_points_have_one_minimum():
     _, _, observations = seed_world(20, noise_px=0.2)
     nudged = observations.with_board(SEED_BOARD.with_points(SEED_BOARD.points + 1e-9))
-    assert worst_px(solved(observations).camera, solved(nudged).camera) < 1e-6
+    # of a model that is led to the minimum itself: mrcal alone stops up to 1e-6 px from it, after a step more or less
+    as_grid, as_points = (solved(seen, "opencv8").camera for seen in (observations, nudged))
+    assert worst_px(as_grid, as_points) < 1e-6
 
 
 @needs_mrcal
