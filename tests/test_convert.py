@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -198,9 +199,10 @@ def test_a_link_stays_and_what_it_leads_to_is_written(stereo: Path, tmp_path: Pa
 def test_outputs_that_are_closed_or_full_and_an_empty_environment(closed: str, tmp_path: Path) -> None:
     save = Camera("cam", "pinhole", np.array([900.0, 901, 500, 400]), (1000, 800)).save
     save(tmp_path / "c.h5")
-    bare = "env -i" if closed == "env" else ""
+    bare = ["env", "-i"] if closed == "env" else []
     where = "" if closed == "env" else closed
-    line = f"{bare} {sys.executable} -m opencsp_calib show {tmp_path / 'c.h5'} --json {where}"
+    show = [sys.executable, "-m", "opencsp_calib", "show", str(tmp_path / "c.h5"), "--json"]
+    line = f"{shlex.join([*bare, *show])} {where}"
     done = subprocess.run(["sh", "-c", line], capture_output=True, text=True, check=False)
     assert "Traceback" not in done.stderr
     assert done.returncode == (2 if closed.startswith(">") else 0)

@@ -1,6 +1,7 @@
 """The solver ``mrcal`` against truth, and what becomes of an mrcal that is absent, slow, killed, or talks nonsense."""
 
 import os
+import shlex
 import stat
 import sys
 import time
@@ -96,9 +97,10 @@ def python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Makes a program take the place of the Python that has mrcal."""
 
     def make(script: str) -> None:
-        program = tmp_path / "python"
-        program.write_text(
-            f"#!{sys.executable}\nimport os, sys, time\nif '--version' in sys.argv:\n    print('0.0')\n"
+        program, code = tmp_path / "python", tmp_path / "code.py"
+        program.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {shlex.quote(str(code))} "$@"\n')
+        code.write_text(
+            "import os, sys, time\nif '--version' in sys.argv:\n    print('0.0')\n"
             f"    sys.exit()\nproblem, solution = sys.argv[2:]\n{script}\n"
         )
         program.chmod(program.stat().st_mode | stat.S_IXUSR)
