@@ -1,6 +1,7 @@
 """Array types by meaning, and the one check of shape and finiteness."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
@@ -77,12 +78,18 @@ def frozen(value: ArrayLike, name: str, shape: Sequence[int | None], *, finite: 
 
 
 def frozen_ids(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Ids:
-    """A read-only copy as int64, or what is given if it is one; fractions are refused."""
+    """A read-only copy as int64, or what is given if it is one; fractions are refused.
+
+    All that count 0, 1, 2 ... are one: most views see the whole of a board, and need no array of their own for that.
+    """
     array = np.asarray(value)
     ids = array.astype(np.int64, copy=False)
     _check_shape(ids.shape, name, shape)
     if array.dtype.kind not in "iu" and not np.array_equal(ids, array):
         raise InputError(f"{name} must be whole numbers")
+    counted = _counted(ids.size)
+    if np.array_equal(ids, counted):
+        return counted
     return ids if _is_frozen(ids) else _read_only(ids.copy())
 
 
@@ -91,6 +98,11 @@ def frozen_mask(value: ArrayLike, name: str, shape: Sequence[int | None]) -> Mas
     mask = np.asarray(value, dtype=np.bool_)
     _check_shape(mask.shape, name, shape)
     return mask if _is_frozen(mask) else _read_only(mask.copy())
+
+
+@lru_cache(maxsize=4)
+def _counted(count: int) -> Ids:
+    return _read_only(np.arange(count, dtype=np.int64))
 
 
 def _check_shape(shape: tuple[int, ...], name: str, expected: Sequence[int | None]) -> None:
