@@ -27,6 +27,7 @@ class Selection:
         self.files: tuple[ImageFile, ...] = ()
         self.paths: dict[str, Path] = {}  # by what a photograph is called
         self.receiving: dict[str, tuple[int, int]] = {}  # batches: how many have come, how many there will be
+        self._over: set[str] = set()  # batches of which no more will come, though one may still be on its way
 
     def add(self, text: str) -> tuple[str, int]:
         """Take the photographs in a folder, or one file; gives what it is called, and how many there are.
@@ -50,16 +51,20 @@ class Selection:
 
     def begin(self, batch: str, count: int) -> None:
         """So many files are about to come."""
-        self.receiving.setdefault(batch, (0, count))
+        if batch not in self._over:
+            self.receiving.setdefault(batch, (0, count))
 
     def received(self, batch: str, count: int) -> bool:
         """One more file of a batch has come, or is given up; whether it was the last."""
+        if batch in self._over:
+            return False
         done = self.receiving.get(batch, (0, 0))[0] + 1
         self.receiving[batch] = (done, count)
         return done >= count
 
     def end(self, batch: str) -> bool:
         """No more files of a batch will come: it is complete, or its page is gone; whether it was still open."""
+        self._over.add(batch)
         was_open = self.receiving.pop(batch, None) is not None
         if was_open:
             self.look_up()
