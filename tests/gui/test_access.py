@@ -7,10 +7,10 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from urllib.parse import urlsplit
+from urllib.parse import quote, urlsplit
 
 import pytest
-from gui_window import Server, Window
+from gui_window import PATIENCE_S, Server, Window
 
 GUI = [sys.executable, "-m", "opencsp_calib", "gui"]
 
@@ -59,7 +59,7 @@ def test_files_outside_of_the_folder_are_out_of_reach(server: Server) -> None:
     assert answer(server, f"/files?path=inside.txt&{token}") == 200
     outside = (
         "../secret.h5",
-        str(secret),
+        quote(str(secret)),
         "link.h5",
         "/etc/passwd",
         "..%2Fsecret.h5",
@@ -98,7 +98,7 @@ def test_wider_open_it_says_what_that_means(port: int, tmp_path: Path) -> None:
     everywhere = "0.0.0.0"  # noqa: S104
     opened = tmp_path / "opened"  # by what stands in for a browser: the last of --no-browser and --browser counts
     asked = ("--host", everywhere, "--port", str(port), "--browser")
-    with Server(tmp_path, *asked, BROWSER=f"sh -c 'echo %s > {opened}'") as server:
+    with Server(tmp_path, *asked, BROWSER=f"sh -c 'echo %s > \"{opened}\"'") as server:
         token = urlsplit(server.address).query
         assert urlsplit(server.address).port == port
         busy = subprocess.run(
@@ -111,7 +111,8 @@ def test_wider_open_it_says_what_that_means(port: int, tmp_path: Path) -> None:
         assert answer(server, "/", address="127.0.0.2") == 403
         assert answer(server, f"/?{token}", address="127.0.0.2", Host=f"evil.example:{port}") == 403
         assert answer(server, f"/?{token}", address="127.0.0.2", Origin="http://evil.example") == 403
-        while not (opened.exists() and opened.read_text().strip()):  # the browser is of the group that is told to end
+        end = time.monotonic() + PATIENCE_S  # for the browser, which is of the group that is told to end
+        while not (opened.exists() and opened.read_text().strip()) and time.monotonic() < end:
             time.sleep(0.01)
     assert opened.read_text().strip() == server.address
     assert server.more_output == ""
