@@ -27,8 +27,9 @@ from opencsp_calib.pose import Pose
 from opencsp_calib.projection_sigma import Alignment
 from opencsp_calib.unknowns import Estimate, Unknowns
 
-__all__ = ["ProjectionGoal", "view_information"]
+__all__ = ["GOAL_PX", "ProjectionGoal", "view_information"]
 
+GOAL_PX = 0.1  # rms over the image: a tenth of a pixel is well below what a measurement with the camera resolves
 PRIOR_FOCAL, PRIOR_MIDDLE = 0.5, 0.25  # sigmas, in focal lengths and in image sides
 PRIOR_DISTORTION = 1.0  # sigma of every coefficient
 PRIOR_WARP = 0.01  # sigma of each bend of the board, in parts of its size

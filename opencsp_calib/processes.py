@@ -25,8 +25,8 @@ def own_process(module: str, *, background: bool = False) -> list[str]:
         is imported, because on Linux a library's threads keep the priority that they were started with.
     """
     steps = [
-        "import os, signal, sys",
-        "signal.signal(signal.SIGINT, signal.SIG_IGN)",
+        "import _signal, os, sys",  # what signal itself is made of: loading that takes as long as all of Python's start
+        "_signal.signal(_signal.SIGINT, _signal.SIG_IGN)",
         "hasattr(os, 'nice') and os.nice(10)" if background else "",
         "sys.path[:] = filter(None, sys.path)",
         f"from {module} import main",

@@ -10,10 +10,10 @@ from opencsp_calib.capture.learner import Learner
 from opencsp_calib.capture.learning import Study
 from opencsp_calib.capture.release import Release
 from opencsp_calib.coach import Knowledge, Moment, Preview, judge_moment
-from opencsp_calib.coach.knowledge import GOAL_PX
 from opencsp_calib.detection import Detection
 from opencsp_calib.errors import InputError
 from opencsp_calib.image import Image
+from opencsp_calib.information import GOAL_PX
 from opencsp_calib.looking import Search
 from opencsp_calib.pose import Pose
 

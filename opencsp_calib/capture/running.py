@@ -12,9 +12,9 @@ from opencsp_calib.capture.capture import Capture, State
 from opencsp_calib.capture.folder import CaptureFolder
 from opencsp_calib.capture.release import release_from
 from opencsp_calib.coach import Knowledge
-from opencsp_calib.coach.knowledge import GOAL_PX
 from opencsp_calib.counted import counted
 from opencsp_calib.errors import InputError
+from opencsp_calib.information import GOAL_PX
 from opencsp_calib.interfaces import ImageSource
 from opencsp_calib.looking import Search
 from opencsp_calib.opencv import opencv_on_one_thread

@@ -18,16 +18,15 @@ from opencsp_calib.coach.next_view import SHAPED, SIGMA_PX, Candidates, NextView
 from opencsp_calib.counted import counted
 from opencsp_calib.detection import Detection, Observations, View
 from opencsp_calib.errors import CalibError
-from opencsp_calib.information import ProjectionGoal, view_information
+from opencsp_calib.information import GOAL_PX, ProjectionGoal, view_information
 from opencsp_calib.initial import initial_camera, initial_poses
 from opencsp_calib.models import lens_model
 from opencsp_calib.pipeline import DEFAULT_MODEL, solve
 from opencsp_calib.pose import Pose
 from opencsp_calib.projection_sigma import sigma_map
 
-__all__ = ["GOAL_PX", "Knowledge", "learn"]
+__all__ = ["Knowledge", "learn"]
 
-GOAL_PX = 0.1  # rms over the image: a tenth of a pixel is well below what a measurement with the camera resolves
 ENOUGH_TO_SOLVE = 4
 SAME_CAMERA = 0.02  # of the focal length
 USUAL_FOCAL = 1.5  # image widths: what is taken before anything is known

@@ -15,6 +15,7 @@ from opencsp_calib.gui.files import within
 from opencsp_calib.gui.live_capture import SHOWN_PX, LiveCapture
 from opencsp_calib.gui.procedure import find_and_calibrate
 from opencsp_calib.gui.wording import worded
+from opencsp_calib.information import GOAL_PX
 from opencsp_calib.registry import installed
 
 if TYPE_CHECKING:
@@ -48,8 +49,6 @@ def build(page: "Page") -> Callable[[], None]:
 
 
 def _controls(page: "Page", live: LiveCapture) -> Callable[[], None]:
-    from opencsp_calib.coach.knowledge import GOAL_PX
-
     asked = {"source": "basler", "device": "", "release": "coach", "count": "50", "folder": "photographs", "set": ""}
     asked |= {"goal": f"{GOAL_PX:g}", "range": ""}
 

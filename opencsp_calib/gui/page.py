@@ -3,10 +3,11 @@
 How a section is added: write a file with a function ``build(page)`` that makes its elements and returns a function
 without arguments which brings them up to date with ``page.session``; it is called whenever the session changes. Put it
 into `STEPS` (left), `RESULTS` (right, shown one at a time) or `TABS` (a tab of its own beside Calibrate) below; what is
-in the last two is built when it is first shown. A section changes nothing itself: it calls a method of the session,
-which tells every page.
+in the last two is not built with the page: a tab right after it is there, a result when it is first shown. A section
+changes nothing itself: it calls a method of the session, which tells every page.
 """
 
+import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 from importlib.resources import files
@@ -142,7 +143,7 @@ class Page:
                     ui.html(f"<h2><span>{number}</span>{title}</h2>", sanitize=False)
                     self._always.append(build(self))
         with Part("main").classes("results"):
-            with ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
+            with Part("div"), ui.tabs().props("no-caps dense align=left").classes("result-tabs") as self._results:
                 self._tabs = {name: ui.tab(name) for name, _ in RESULTS}
             panels = Panels(self._results)
             for name, build in RESULTS:
@@ -168,9 +169,10 @@ class Page:
             return
         self._connected = True
         await self.session.ask_plugins()
-        # what the browser loads for these would come while both cores look for corners
-        for name in BEFORE_CALIBRATION:
-            self._refreshers[name]()
+        # what the browser makes of these would come while both cores look for corners
+        for refresh in (*map(self._refreshers.__getitem__, BEFORE_CALIBRATION), *self._seldom.values()):
+            refresh()
+            await asyncio.sleep(0)  # other pages are answered meanwhile
 
     async def _send_again(self) -> None:
         """Send every element as it is now.

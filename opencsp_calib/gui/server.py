@@ -2,12 +2,12 @@
 
 import logging
 import secrets
+import signal
 import socket
 import sys
 import threading
 import webbrowser
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 import nicegui
@@ -56,10 +56,10 @@ def serve(folder: Path, host: str, port: int, *, open_browser: bool) -> None:
     guarded = Guard(_application(session, opened), token, names, any_address=open_to_all)
     server = uvicorn.Server(uvicorn.Config(guarded, log_level="error", access_log=False, ws_max_size=2**24))
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # else each address that is not there is told, with the token
+    signal.signal(signal.SIGINT, server.handle_exit)  # Ctrl-C, the usual end, from the address on
     sys.stdout.write(address + "\n")
     sys.stdout.flush()
-    with suppress(KeyboardInterrupt):  # the usual end
-        server.run(sockets=[listening])
+    server.run(sockets=[listening])
 
 
 def _application(session: Session, started: Callable[[], None]) -> FastAPI:

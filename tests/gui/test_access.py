@@ -1,6 +1,7 @@
 """Who is let into the window, and what it asks of others."""
 
 import http.client
+import signal
 import socket
 import subprocess
 import sys
@@ -91,6 +92,17 @@ def port() -> Iterator[int]:
         held.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         held.bind(("127.0.0.1", 0))
         yield held.getsockname()[1]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="a test cannot press Ctrl-C there")
+@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.1, 0.3])
+def test_ctrl_c_ends_it_without_a_word(tmp_path: Path, delay_s: float) -> None:
+    """From the instant on in which the address is there."""
+    with Server(tmp_path) as server:
+        time.sleep(delay_s)
+        server.process.send_signal(signal.SIGINT)
+        server.process.wait(60)
+    assert (server.process.returncode, server.more_output, server.errors) == (0, "", "")
 
 
 def test_wider_open_it_says_what_that_means(port: int, tmp_path: Path) -> None:

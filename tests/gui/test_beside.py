@@ -79,6 +79,20 @@ def test_the_keyboard_alone_will_do(calibrated: Window) -> None:
     calibrated.until(lambda: calibrated.find_all("img[alt='size of the distortion']"))
 
 
+def test_the_keyboard_does_not_go_behind_what_is_seen(window: Window) -> None:
+    """Not even to a tab that would scroll, if it were in front."""
+    from selenium.webdriver import ActionChains, Keys
+
+    size = window.browser.get_window_size()
+    window.browser.set_window_size(1000, 500)
+    window.tab("Capture")
+    behind = "return document.activeElement.closest('.behind, [aria-hidden=true]')?.ariaLabel"
+    for _ in range(20):
+        ActionChains(window.browser).send_keys(Keys.TAB).perform()
+        assert not window.browser.execute_script(behind)
+    window.browser.set_window_size(size["width"], size["height"])
+
+
 def test_a_camera_file_is_solved_again_and_views_are_left_out(calibrated: Window) -> None:
     rms, folder = calibrated.rms, calibrated.server.folder
     calibrated.type("save-as", "to-solve-again.h5")
