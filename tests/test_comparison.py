@@ -114,6 +114,22 @@ def test_pixels_without_an_image_are_counted_and_left_out() -> None:
             assert difference.rms_px < 30
 
 
+def test_is_the_minimum_of_the_pixels_that_have_an_image() -> None:
+    """Though a frame that is tried may hide others."""
+    folded = Camera("folded", "opencv4", np.array([900.0, 900, 812.5, 617.5, -0.4, 0.0, 0.0, 0.0]), SIZE)
+    other = changed(folded, cx=30.0, cy=-10.0)
+    difference = compare(folded, other)
+    known = np.isfinite(difference.length_px)
+    rays, pixels = folded.unproject(difference.pixels[known]), difference.pixels[known]
+
+    def residuals(turn: np.ndarray) -> np.ndarray:
+        return (cv2.projectPoints(rays, turn, np.zeros(3), other.matrix, other.distortion)[0][:, 0] - pixels).ravel()
+
+    found = least_squares(residuals, np.zeros(3), x_scale="jac", xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert difference.missing > 0
+    assert difference.rms_px == pytest.approx(np.sqrt(2 * found.cost / len(rays)), rel=1e-8)
+
+
 def test_different_lens_models_of_one_lens_do_not_differ() -> None:
     more = replace(CAMERA, model="opencv8", params=np.concatenate([PARAMS, np.zeros(4)]))
     assert compare(CAMERA, more).worst_px < 1e-8
