@@ -182,7 +182,7 @@ def test_devices_pipes_and_circles_of_links_are_no_outputs(stereo: Path, tmp_pat
     for out in ("/dev/null", tmp_path / "pipe", tmp_path / "circle"):
         command("convert", stereo, out, "--camera", "right", "--to", "ros", code=2)
         assert "cannot write" in capsys.readouterr().err
-        command("show", tmp_path / "circle", code=2)
+    command("show", tmp_path / "circle", code=2)
     assert not Path("/dev/null").is_file()
 
 
