@@ -6,7 +6,7 @@ import subprocess
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from opencsp_calib import Camera, InputError
@@ -131,6 +131,15 @@ def test_jacobians_are_the_slopes(model: str) -> None:
         np.testing.assert_allclose(by_params[:, :, index], slope, rtol=1e-6, atol=2e-5)
 
 
+@every_model
+def test_along_its_ray_a_point_stays_where_it_is_seen(model: str) -> None:
+    """By Euler, of any projection: its derivative by the point, times the point, is nothing. Near the axis too."""
+    near = np.array([[5e-5, -3e-5, 1.0], [1e-6, 0.0, 1.0], [0.3, 0.2, 1.0]])
+    points = np.concatenate([near * scale for scale in (0.01, 0.5, 2.0, 30.0)])
+    _, by_point, _ = CAMERAS[model].lens.project_with_jacobians(points, CAMERAS[model].params)
+    np.testing.assert_allclose(np.einsum("nij,nj->ni", by_point, points), 0.0, rtol=0, atol=1e-9)
+
+
 def test_fisheye_jacobian_is_smooth_on_the_axis_and_right_behind_the_camera() -> None:
     camera = CAMERAS["opencv_fisheye"]
     points = np.array([[0, 0, 2.0], [1e-9, 0, 2.0], [9e-5, 9e-5, 1.0], [2e-4, -1e-4, 1.0], [1.0, 0.3, -0.2], [1, 1, 0]])
@@ -155,6 +164,16 @@ def test_what_has_no_image_is_nan() -> None:
 def test_a_pole_of_the_rational_model_ends_its_validity() -> None:
     camera = Camera("pole", "opencv8", [1000, 1000, 800, 600, 0, 0, 0, 0, 0, -1.0, 0, 0], SIZE)
     assert camera.valid_radius == pytest.approx(1.0)
+
+
+@every_model
+def test_up_to_the_largest_angle_there_is_an_image(model: str) -> None:
+    camera = CAMERAS[model]
+    largest, around = camera.lens.max_angle(camera.distortion), np.linspace(0, 2 * np.pi, 9)
+    for angle, seen in ((largest - 1e-6, True), (largest + 1e-6, False)):
+        z = np.full(9, np.cos(angle))
+        rays = np.column_stack([np.sin(angle) * np.cos(around), np.sin(angle) * np.sin(around), z])
+        assert (np.isfinite(camera.project(rays)) == seen).all()
 
 
 def test_fisheye_sees_beside_and_behind_but_not_where_it_folds() -> None:
@@ -182,6 +201,18 @@ def test_unproject_undoes_project_wherever_there_is_an_image(k: list, p: list, f
     rays = camera.unproject(grid())
     seen = np.isfinite(rays).all(axis=1)
     np.testing.assert_allclose(camera.project(rays[seen]), grid()[seen], rtol=0, atol=2e-9)
+
+
+@settings(max_examples=30)
+@given(k=st.tuples(*[st.floats(-0.3, 0.3)] * 3), p=st.tuples(*[st.floats(-0.001, 0.001)] * 2))
+def test_unproject_finds_all_that_is_seen_where_the_image_is_not_nearly_folded(k: tuple, p: tuple) -> None:
+    camera = Camera("any", "opencv5", [1000, 1010, 800, 600, k[0], k[1], *p, k[2]], SIZE)
+    radii = np.linspace(0, min(0.9 * camera.valid_radius, 1.5), 200)
+    assume((1 + 3 * k[0] * radii**2 + 5 * k[1] * radii**4 + 7 * k[2] * radii**6).min() > 0.1)
+    around = np.arange(200)
+    points = np.column_stack([radii * np.cos(around), radii * np.sin(around), np.ones(200)])
+    rays = points / np.linalg.norm(points, axis=1, keepdims=True)
+    np.testing.assert_allclose(camera.unproject(camera.project(points)), rays, rtol=0, atol=1e-9)
 
 
 def test_an_unknown_model_names_those_there_are() -> None:

@@ -135,7 +135,7 @@ def compiled(copy: Path) -> bool:
 def outcome(copy: Path, part: Part, timeout_s: float) -> str:
     """What the tests of the part do: "pass", "fail", or "hang"."""
     tests = [f"tests/{name}.py" for name in part.tests]
-    options = ["-x", "-q", "-p", "no:cacheprovider", "-W", "ignore", "-k", "not mrcal"]  # it starts a Python each time
+    options = ["-x", "-q", "-p", "no:cacheprovider", "-k", "not mrcal"]  # it starts a Python each time
     paths = os.pathsep.join(str(copy / folder) for folder in ("", "plugins"))
     environment = {**os.environ, "PYTHONPATH": paths, "PYTHONDONTWRITEBYTECODE": "1"}
     command = [sys.executable, "-m", "pytest", *options, *tests]
