@@ -6,13 +6,14 @@ from opencsp_calib.arrays import Floats
 from opencsp_calib.board import Board, Checkerboard
 from opencsp_calib.detection import Detection
 from opencsp_calib.image import Image
-from opencsp_calib_opencv.grid import count
+from opencsp_calib_opencv.grid import count, known
 
 __all__ = ["emptiness", "incomplete", "not_placed", "two_boards"]
 
 SAMPLE_STEP = 7  # pixels: a hundredth of the image tells whether there is anything in it
 FLAT = 0.02  # of the image's range, from the 1st to the 99th percentile
 FEWEST_CORNERS = 9
+LEAST_FULL = 0.5  # of a line of corners
 
 
 def emptiness(image: Image) -> str | None:
@@ -45,9 +46,9 @@ def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
         Whether a margin is seen all around it.
     """
     wanted = f"{board.columns}x{board.rows}"
-    if grid is None or count(grid) < FEWEST_CORNERS or min(grid.shape[:2]) < 3:
+    if grid is None or count(grid) < FEWEST_CORNERS or _size(grid)[0] < 3:
         return Detection.nothing(f"no {wanted} checkerboard was found")
-    small, large = sorted(grid.shape[:2])
+    small, large = _size(grid)
     least, most = sorted(board.grid)
     found = f"{large}x{small}" if board.columns >= board.rows else f"{small}x{large}"
     other = whole or small > least or large > most
@@ -64,6 +65,13 @@ def not_placed(board: Board, grid: Floats | None, whole: bool) -> Detection:
         f"only {found} corners in a block were found of {wanted}, and which ones cannot be told; "
         "show the whole board, or all of it one way and its white margin the other"
     )
+
+
+def _size(grid: Floats) -> tuple[int, int]:
+    """The lines of a grid either way, the fewer first; one that is not half full is taken for something else nearby."""
+    there = known(grid)
+    rows, columns = ((there.mean(axis=along) > LEAST_FULL).sum() for along in (1, 0))
+    return int(min(rows, columns)), int(max(rows, columns))
 
 
 def two_boards(board: Board) -> str:
