@@ -14,7 +14,6 @@ from opencsp_calib import Board, InputError, Pose
 from opencsp_calib.capture import Capture, CaptureFolder, Release, State, release_from
 from opencsp_calib.capture.learner import Learner
 from opencsp_calib.capture.learning import Study
-from opencsp_calib.coach import Preview
 from opencsp_calib.errors import CalibError
 from opencsp_calib.image import Image
 from opencsp_calib.images import ImageFile, read_image, write_image
@@ -110,29 +109,6 @@ def test_an_interval_releases_whatever_the_coach_thinks(small_world, tmp_path):
     frames.add("head-on", frames.pose(0), 3)
     for name, seconds, count in (("every", 0.0, 3), ("first", 1000.0, 1)):
         assert released(frames, tmp_path / name, Release("interval", seconds), waiting=False) == ["head-on"] * count
-
-
-def test_an_interval_is_between_frames_however_long_each_is_looked_at(small_world, tmp_path, monkeypatch):
-    comes_s, looked_at_s = (0.0, 2.0, 3.9, 4.1, 7.0), iter((1.0, 0.0, 0.2, 1.0, 0.0))
-    now_s, taken = 0.0, []
-
-    def frames():
-        nonlocal now_s
-        for number, came_s in enumerate(comes_s):
-            now_s = came_s
-            yield grey(number, 64)
-
-    class Slow(Preview):
-        def look(self, image):
-            nonlocal now_s
-            now_s += next(looked_at_s)
-            return super().look(image)
-
-    monkeypatch.setattr("opencsp_calib.capture.capture.Preview", Slow)
-    search, every_two = search_for(small_world.board), Release("interval", 2.0)
-    capture = Capture(folder_of(tmp_path), search, every_two, 5, clock=lambda: now_s)
-    capture.run(frames(), lambda state: taken.append(bool(state.new)))
-    assert taken == [True, True, False, True, True]
 
 
 def test_interval_and_hand_in_seconds():

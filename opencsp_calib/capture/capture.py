@@ -138,7 +138,6 @@ class Capture:
         return self._stopped.is_set() or state.taken >= state.count or by_coach
 
     def _step(self, image: Image) -> State:
-        now_s = self._clock()  # when it came: looking at it takes longer at one time than at another
         learner = self._learner = self._learner or self._begun(image)
         expected = learner.knowledge.camera.image_size
         if image.size != expected:
@@ -146,8 +145,7 @@ class Capture:
             raise InputError(f"the images are {sizes}: the camera's region or binning has changed; use another folder")
         self._delete_if_asked()
         moment = judge_moment(self._preview.look(image), self._known(learner), self._places)
-        due = self._is_due(image, moment, now_s - self._last_s)
-        new = self._photographed(image, moment, learner, now_s) if due else ""
+        new = self._photographed(image, moment, learner) if self._is_due(image, moment) else ""
         return State(moment, learner.knowledge, len(self.folder.images), self.count, new)
 
     def _known(self, learner: Learner) -> Knowledge:
@@ -159,13 +157,14 @@ class Capture:
             known = known.having_seen(pose)
         return known
 
-    def _is_due(self, image: Image, moment: Moment, since_s: float) -> bool:
+    def _is_due(self, image: Image, moment: Moment) -> bool:
+        since_s = self._clock() - self._last_s
         due = self.release.due(right=moment.right, pressed=self._pressed.is_set(), since_s=since_s)
         return due and image.sha256 not in self._sources
 
-    def _photographed(self, image: Image, moment: Moment, learner: Learner, now_s: float) -> str:
+    def _photographed(self, image: Image, moment: Moment, learner: Learner) -> str:
         self._pressed.clear()
-        self._last_s = now_s
+        self._last_s = self._clock()
         name = self.folder.add(image).name
         self._places.append(moment.glance.detection)
         self._glimpsed += [moment.pose] if moment.pose else []
