@@ -13,8 +13,6 @@ __all__ = ["CONVERGED_PX", "LensModel", "inverse_radius", "smallest_positive_roo
 CONVERGED_PX = 1e-9
 """`unproject` iterates until its rays project back to the pixels this closely."""
 
-TINY = 1e-100  # of a polynomial's largest coefficient: higher terms below it overflow the search for roots
-
 
 class LensModel(ABC):
     """A named projection of points in the camera's frame (x right, y down, z forward) to pixels.
@@ -127,11 +125,15 @@ class LensModel(ABC):
 
 
 def smallest_positive_root(*polynomials: Any) -> float:
-    """The smallest positive real root of polynomials (arrays, from the constant term up); infinite if none."""
-    roots = np.concatenate([np.polynomial.Polynomial(p).trim(TINY * np.abs(p).max()).roots() for p in polynomials])
-    real = roots[np.abs(roots.imag) <= 1e-9 * np.abs(roots)].real
-    positive = real[real > 0]
-    return float(positive.min()) if positive.size else np.inf
+    """The smallest positive real root of polynomials (arrays, from the constant term up); infinite if none.
+
+    Found as the inverse of the largest root of the polynomials turned around: a term of 1e-50 at their end is a root
+    next to 0 there; at their beginning it would be one so far out that it takes the digits of the others.
+    """
+    inverse = np.concatenate([np.roots(polynomial) for polynomial in polynomials])  # takes the highest term first
+    real = inverse[np.abs(inverse.imag) <= 1e-9 * np.abs(inverse)].real
+    largest = float(real.max(initial=0.0))
+    return 1.0 / largest if largest > 0 else np.inf
 
 
 def inverse_radius(distorted: Floats, distort: Callable[[Floats], Floats], limit: float) -> Floats:
