@@ -5,23 +5,17 @@ import subprocess
 import sys
 from typing import IO, Any
 
-__all__ = ["APART", "BACKGROUND", "answers", "own_process"]
+__all__ = ["BACKGROUND", "answers", "own_process"]
 
-APART: dict[str, Any] = {"process_group": 0} if os.name == "posix" and sys.version_info >= (3, 11) else {}
-"""How a process is started, beside the command: Ctrl-C would end it before it has come so far as to ignore it.
-
-In a group, not in a session of its own, where Linux would no longer hold its priority against ours.
-"""
-
-BACKGROUND: dict[str, Any] = {**APART, "creationflags": getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)}
-"""The same for one that runs in the background, which Windows wants to be told here."""
+BACKGROUND: dict[str, Any] = {"creationflags": getattr(subprocess, "BELOW_NORMAL_PRIORITY_CLASS", 0)}
+"""What Windows wants to be told, beside the command, where a process is started that runs in the background."""
 
 
 def own_process(module: str, *, background: bool = False) -> list[str]:
     """The command that runs the ``main`` of a module.
 
     Without the current folder in its path: people start us in their folders of photographs, and a file named
-    ``random.py`` there must not take the place of Python's own. Ctrl-C is for the process that started it, see `APART`.
+    ``random.py`` there must not take the place of Python's own. Ctrl-C is for the process that started it.
 
     Parameters
     ----------

@@ -9,7 +9,7 @@ from nicegui import Event
 
 from opencsp_calib.counted import counted
 from opencsp_calib.gui.news import Message
-from opencsp_calib.processes import APART, own_process
+from opencsp_calib.processes import own_process
 
 __all__ = ["SHOWN_PX", "LiveCapture"]
 
@@ -49,7 +49,6 @@ class LiveCapture:
             stdin=asyncio.subprocess.PIPE,
             stdout=asyncio.subprocess.PIPE,
             limit=MAX_LINE,
-            **APART,
         )
         self.order(json.dumps({**asked, "shown_px": SHOWN_PX}))
         self._reading = asyncio.get_running_loop().create_task(self._read(self._process))
