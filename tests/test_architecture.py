@@ -14,7 +14,7 @@ ROOT = CORE.parent
 PLUGINS = ROOT / "plugins"
 
 TIERS = (
-    "errors counted process_setting",
+    "errors counted process_setting stopping",
     "arrays atomic native opencv blas processes provenance seal hdf5_reading hdf5_writing",
     "models",
     "camera rotations convex_hull board",

@@ -278,6 +278,6 @@ def test_an_interruption_that_a_library_turned_into_an_error_is_one_line(monkeyp
     monkeypatch.setattr("opencsp_calib.cli.app", interrupted)
     with pytest.raises(TypeError):
         run(["formats"])
-    monkeypatch.setattr("opencsp_calib.cli.stopping._told", [15])
+    monkeypatch.setattr("opencsp_calib.stopping._told", [15])
     assert run(["formats"]) == 1
     assert capsys.readouterr().err.startswith("error: stopped")

@@ -17,8 +17,8 @@ from opencsp_calib.cli import calibrating, cameras, capturing, checking, convert
 from opencsp_calib.cli.console import complain, say
 from opencsp_calib.cli.help import CommandWithSections, first_line
 from opencsp_calib.cli.setting_up import print_versions
-from opencsp_calib.cli.stopping import stop_when_told, was_told
 from opencsp_calib.errors import CalibError, InputError
+from opencsp_calib.stopping import stop_when_told, was_told
 
 __all__ = ["app", "main"]
 

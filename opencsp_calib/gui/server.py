@@ -2,7 +2,6 @@
 
 import logging
 import secrets
-import signal
 import socket
 import sys
 import threading
@@ -20,6 +19,7 @@ from opencsp_calib.gui.guard import LOCAL, Guard
 from opencsp_calib.gui.page import show
 from opencsp_calib.gui.routes import routes
 from opencsp_calib.gui.session import Session
+from opencsp_calib.stopping import stop_when_told
 
 __all__ = ["serve"]
 
@@ -56,7 +56,7 @@ def serve(folder: Path, host: str, port: int, *, open_browser: bool) -> None:
     guarded = Guard(_application(session, opened), token, names, any_address=open_to_all)
     server = uvicorn.Server(uvicorn.Config(guarded, log_level="error", access_log=False, ws_max_size=2**24))
     logging.getLogger("nicegui").setLevel(logging.ERROR)  # else each address that is not there is told, with the token
-    signal.signal(signal.SIGINT, server.handle_exit)  # Ctrl-C, the usual end, from the address on
+    stop_when_told(server.handle_exit)  # the usual end, from the address on
     sys.stdout.write(address + "\n")
     sys.stdout.flush()
     server.run(sockets=[listening])

@@ -95,12 +95,12 @@ def port() -> Iterator[int]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="a test cannot press Ctrl-C there")
-@pytest.mark.parametrize("delay_s", [0.0, 0.02, 0.1, 0.3])
-def test_ctrl_c_ends_it_without_a_word(tmp_path: Path, delay_s: float) -> None:
-    """From the instant on in which the address is there."""
+@pytest.mark.parametrize(("told", "delay_s"), [("INT", 0.0), ("INT", 0.02), ("INT", 0.1), ("TERM", 0.0), ("HUP", 0.3)])
+def test_it_ends_without_a_word_when_it_is_told(tmp_path: Path, told: str, delay_s: float) -> None:
+    """By Ctrl-C, a service manager or a terminal that is closed, from the instant on in which the address is there."""
     with Server(tmp_path) as server:
         time.sleep(delay_s)
-        server.process.send_signal(signal.SIGINT)
+        server.process.send_signal(signal.Signals[f"SIG{told}"])
         server.process.wait(60)
     assert (server.process.returncode, server.more_output, server.errors) == (0, "", "")
 
