@@ -9,7 +9,7 @@ import os
 import re
 import sys
 import warnings
-from typing import Any
+from typing import Any, TextIO
 
 import typer
 
@@ -57,8 +57,22 @@ def main() -> None:
     stop_when_told()
     gc.set_threshold(50_000)  # a command makes many objects and hardly a cycle: looking for some is a 20th of its time
     code = run(sys.argv[1:])
+    written, _ = (_written(stream) for stream in (sys.stdout, sys.stderr))
+    code = code or (0 if written else 2)
     gc.freeze()  # or Python would look for cycles among all it ever made before it ends, for nothing
     sys.exit(code)
+
+
+def _written(stream: TextIO | None) -> bool:
+    """Whether a full disk took all; if not, Python must not try again at its end, which has an exit code of its own."""
+    if stream is None:  # closed
+        return True
+    try:
+        stream.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+        return False
+    return True
 
 
 def run(arguments: list[str]) -> int:
