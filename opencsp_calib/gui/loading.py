@@ -13,13 +13,14 @@ CLIENTS = ("aiohttp", "requests", "tornado", "websocket")
 
 
 def serve(folder: Path, host: str, port: int, *, open_browser: bool) -> None:
-    """Load what `server.serve` needs, then do what it does."""
+    """Load what `server.serve` needs, then do what it does, unless the folder has a window already."""
     gc.disable()  # loading makes very many objects and no garbage, and looking for some takes a tenth of its time
     with _absent(CLIENTS):  # a sixth of it
-        from opencsp_calib.gui import server
+        from opencsp_calib.gui import one_window, server
     gc.freeze()  # nor is there any later among what is loaded; looking would hold up answers to the page
     gc.enable()
-    server.serve(folder, host, port, open_browser=open_browser)
+    with one_window.only_window(folder):
+        server.serve(folder, host, port, open_browser=open_browser)
 
 
 @contextmanager

@@ -105,6 +105,18 @@ def test_it_ends_without_a_word_when_it_is_told(tmp_path: Path, told: str, delay
     assert (server.process.returncode, server.more_output, server.errors) == (0, "", "")
 
 
+def test_a_folder_has_one_window_at_a_time(tmp_path: Path) -> None:
+    """Two would write the same session file; one that was killed is in nobody's way."""
+    with Server(tmp_path) as server:
+        second = subprocess.run([*GUI, str(tmp_path / "."), "--no-browser"], capture_output=True, text=True)
+        server.process.kill()
+        server.process.wait(60)
+    assert (second.returncode, second.stdout) == (2, "")
+    assert second.stderr.startswith(f"error: {tmp_path} is open in another window already")
+    with Server(tmp_path):
+        pass
+
+
 def test_wider_open_it_says_what_that_means(port: int, tmp_path: Path) -> None:
     """Other machines need the token as well, and a page of another name is refused as ever."""
     everywhere = "0.0.0.0"  # noqa: S104
@@ -113,9 +125,8 @@ def test_wider_open_it_says_what_that_means(port: int, tmp_path: Path) -> None:
     with Server(tmp_path, *asked, BROWSER=f"sh -c 'echo %s > \"{opened}\"'") as server:
         token = urlsplit(server.address).query
         assert urlsplit(server.address).port == port
-        busy = subprocess.run(
-            [*GUI, str(tmp_path), "--no-browser", "--port", str(port)], capture_output=True, text=True
-        )
+        (other := tmp_path / "other").mkdir()
+        busy = subprocess.run([*GUI, str(other), "--no-browser", "--port", str(port)], capture_output=True, text=True)
         assert busy.returncode == 2
         assert "take another --port" in busy.stderr
         assert urlsplit(server.address).hostname == socket.gethostname().lower()
