@@ -205,6 +205,7 @@ def test_unproject_undoes_project_wherever_there_is_an_image(k: list, p: list, f
 
 @settings(max_examples=30)
 @example(k=(-0.125, 0.0, 4e-53), p=(0.0, 0.0))  # a term next to nothing hid where the image folds
+@example(k=(0.0, 0.0, -3.02e-97), p=(0.0, 8.36e-4))  # nor is that so far out that rays are looked for too far
 @given(k=st.tuples(*[st.floats(-0.3, 0.3)] * 3), p=st.tuples(*[st.floats(-0.001, 0.001)] * 2))
 def test_unproject_finds_all_that_is_seen_where_the_image_is_not_nearly_folded(k: tuple, p: tuple) -> None:
     camera = Camera("any", "opencv5", [1000, 1010, 800, 600, k[0], k[1], *p, k[2]], SIZE)

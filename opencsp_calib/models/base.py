@@ -153,15 +153,12 @@ def inverse_radius(distorted: Floats, distort: Callable[[Floats], Floats], limit
         The limit itself where the distorted radius is never reached.
     """
     low = np.zeros_like(distorted)
-    if np.isfinite(limit):
-        high = np.full_like(distorted, limit)
-    else:
-        high = np.maximum(distorted, 1e-3)
-        for _ in range(60):
-            short = distort(high) < distorted
-            if not short.any():
-                break
-            high[short] *= 2.0
+    high = np.minimum(np.maximum(distorted, 1e-3), limit)  # the limit itself may be so far out that halving never ends
+    for _ in range(60):
+        short = (high < limit) & (distort(high) < distorted)
+        if not short.any():
+            break
+        high[short] = np.minimum(2.0 * high[short], limit)
     for _ in range(30):
         middle = 0.5 * (low + high)
         below = distort(middle) < distorted
