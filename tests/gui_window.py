@@ -30,6 +30,8 @@ class Server:
     def __enter__(self) -> "Server":
         command = [sys.executable, "-m", "opencsp_calib", "gui", str(self.folder), "--no-browser", *self._options]
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        if os.name == "posix":
+            pipes["preexec_fn"] = _heard
         self.process = subprocess.Popen(command, **pipes, text=True, env=self._environment, start_new_session=True)
         self.address = self.process.stdout.readline().strip()
         match = re.fullmatch(r"(http://[\w.-]+:[0-9]+/)\?token=([\w-]{20,})", self.address)
@@ -53,6 +55,12 @@ class Server:
         workers = [child for child in psutil.Process(self.process.pid).children() if "gui.jobs" in child.cmdline()[-1]]
         assert len(workers) == 1
         workers[0].suspend()
+
+
+def _heard() -> None:
+    """Have signals heard that a shell, or nohup, which started the tests aside has them ignore."""
+    for ignored in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(ignored, signal.SIG_DFL)
 
 
 class Window:

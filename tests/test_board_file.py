@@ -82,7 +82,7 @@ def swapped(points: np.ndarray) -> list[list[float]]:
         (json.dumps(record(points_m=[[0.0, 0.0, float("nan")]] * 20)), "NaN is not a number"),
         (json.dumps(record(points_m=[[0.0, 0.0, float("inf")]] * 20)), "Infinity is not a number"),
         (json.dumps(record(points_m=[[0.0, 0.0, 10**400]] * 20)), "too large"),
-        (json.dumps(record()).replace("0.03,", "1e999,"), "NaN or infinite"),
+        (json.dumps(record()).replace("0.03,", "1e999,"), "NaN or infinity"),
         (json.dumps(record(points_m=[[0.0, 0.0, 0.0]] * 20)), "0 times as far apart"),
         (json.dumps(record(points_m=(BOARD.points * 1000).tolist())), "1000 times as far apart"),
         (json.dumps(record(points_m=swapped(BOARD.points))), "in order of ids"),

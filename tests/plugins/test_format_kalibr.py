@@ -143,7 +143,7 @@ def test_a_model_with_too_much_is_not_written(tmp_path: Path) -> None:
         ("ds", [0.5], "none", [], "has 5 numbers, expected 6"),
         ("ds", [0.5, 1.5], "none", [], "no camera of the model ds"),
         ("eucm", [0.5, -1.0], "none", [], "no camera of the model eucm"),
-        ("pinhole", [], "radtan", [0.1], "has 1 numbers, expected 4"),
+        ("pinhole", [], "radtan", [0.1], "has 1 number, expected 4"),
         ("pinhole", [], "fov", [9.0], "no angle below pi"),
     ],
 )
