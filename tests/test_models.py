@@ -154,8 +154,10 @@ def test_what_has_no_image_is_nan() -> None:
     folding = Camera("folds", "opencv4", [1000, 1000, 800, 600, -0.4, 0.0, 0, 0], SIZE)
     radius = folding.valid_radius
     assert radius == pytest.approx(1 / np.sqrt(1.2))  # d/dr (r - 0.4 r³) = 0
-    points = np.array([[0, 0, -1.0], [0, 0, 0], [radius * 1.001, 0, 1], [radius * 0.999, 0, 1], [np.nan, 0, 1]])
-    assert np.isnan(folding.project(points)).all(axis=1).tolist() == [True, True, True, False, True]
+    points = np.array(
+        [[0, 0, -1.0], [0, 0, 0], [1, 0, 0], [radius * 1.001, 0, 1], [radius * 0.999, 0, 1], [np.nan, 0, 1]]
+    )
+    assert np.isnan(folding.project(points)).all(axis=1).tolist() == [True, True, True, True, False, True]
     beyond = 800 + 1000 * (radius - 0.4 * radius**3) + 1
     assert np.isnan(folding.unproject([[beyond, 600.0]])).all()
     assert np.isfinite(folding.unproject([[beyond - 2, 600.0]])).all()
